@@ -20,9 +20,9 @@ RATE = 2000  # samples a second
 # Substrings of function names, searched from the innermost frame outward; the first stage with a match counts.
 STAGES = [
     ("glass", ["crossing", "contact", "isolated", "meeting", "touch_error", "specular", "near_shape", "encloses"]),
-    ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "flat_shares", "go_to", "samples_at"]),
-    ("lights: samples", ["sample_row", "sample_each", "light_pdf", "inverse_densit"]),
-    ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_of_few", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_unoccluded"]),
+    ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "single_node_importance", "move_to", "samples_at"]),
+    ("lights: samples", ["sample_row", "sample_per_lane", "light_pdf", "inverse_pdf"]),
+    ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_in_small", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_unoccluded"]),
     ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_at_start", "in_f64", "alone", "nearer", "packet::Closest", "merged::rays"]),
     ("surfaces", ["fill_surfaces", "fill_other_surfaces", "surface", "facet", "set_positions", "set_bsdf", "packet::Meeting"]),
     ("textures", ["lookup", "texture"]),

@@ -2,7 +2,7 @@
 //!
 //! | folder | what it knows |
 //! | --- | --- |
-//! | [`world`] | everything ready to trace: objects under their trees, materials, lights, the camera, bodies of glass |
+//! | [`world`] | everything ready to trace: objects and their trees, materials, lights, the camera, glass solids |
 //! | `integrators/` | [`RenderSettings`](integrators::RenderSettings), [`View`](integrators::View), and [`render_tile_with_photons`](integrators::render_tile_with_photons), which renders a tile |
 //! | `integrators/transport/` | rays of a tile, packets of their hits, vertices in rows of sixteen, the walk through glass, scattering |
 //! | `integrators/direct/` | light samples, shadow rays, lobe rays, MIS weights |

@@ -6,16 +6,16 @@ use glimt::control::CancelToken;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Integrator, Material, Shape};
-use glimt::world::Bodies;
+use glimt::world::GlassSolids;
 
 use super::photons::{assert_same_light, both};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
 use super::{Random, v};
 
 /// The bodies of what is built.
-fn bodies(build: &Build) -> Bodies {
+fn bodies(build: &Build) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
-    Bodies::find(&build.scene, &meshes, &CancelToken::new()).expect("nobody cancels")
+    GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("nobody cancels")
 }
 
 /// A prism over a polygon in the plane z = 0, counter-clockwise from +z, of which each side is cut into squares.
@@ -129,7 +129,7 @@ fn a_body_in_parts_is_the_body() {
         let last = several.scene.objects.len() as u32 - 1;
         for part in 2..=last {
             assert_eq!(found.place(part), last, "round {round}");
-            assert!(!found.is_turned(part), "round {round}");
+            assert!(!found.is_inside_out(part), "round {round}");
         }
         let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
         assert!(one_path == several_path, "round {round}: {} parts by path", parts.len());
@@ -157,7 +157,7 @@ fn a_part_that_looks_the_other_way_is_turned() {
         let found = bodies(&build);
         assert!(found.open().is_empty(), "round {round}: {:?}", found.open());
         for (object, flip) in (2..).zip(&flips) {
-            assert_eq!(found.is_turned(object), *flip, "round {round}");
+            assert_eq!(found.is_inside_out(object), *flip, "round {round}");
         }
         // Corners in another order round otherwise, and few paths are others.
         let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
@@ -229,7 +229,7 @@ fn quads_and_disks_close_bodies() {
         let own = bodies(&of(quads(v(0.1, 0.2, -0.3), v(1.4, 0.9, 0.7), flips)));
         assert!(own.open().is_empty(), "{flips}: {:?}", own.open());
         for quad in 0..6 {
-            assert_eq!((own.place(quad), own.is_turned(quad)), (5, flips >> quad & 1 == 1), "{flips}");
+            assert_eq!((own.place(quad), own.is_inside_out(quad)), (5, flips >> quad & 1 == 1), "{flips}");
         }
     }
     // One is missing.
@@ -248,7 +248,7 @@ fn quads_and_disks_close_bodies() {
     let own = bodies(&of(vec![tube.clone(), lid(a, b - a), lid(b, b - a)]));
     assert!(own.open().is_empty(), "{:?}", own.open());
     assert_eq!(
-        [0, 1, 2].map(|part| (own.place(part), own.is_turned(part))),
+        [0, 1, 2].map(|part| (own.place(part), own.is_inside_out(part))),
         [(2, false), (2, true), (2, false)]
     );
     let hat = Shape::Cone { base: a, tip: b, radius: 0.4, cap: false };
@@ -391,14 +391,14 @@ fn seams_of_textures_are_no_holes() {
     let triangles = (0..whole.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let loose = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
     let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, AS_IT_IS, glass(1.5)));
-    assert_eq!(of(loose), Bodies::default());
-    assert_eq!(of(whole.clone()), Bodies::default());
+    assert_eq!(of(loose), GlassSolids::default());
+    assert_eq!(of(whole.clone()), GlassSolids::default());
     // Its front looks inwards.
-    assert!(of(turned(&whole)).is_turned(0) && of(turned(&whole)).open().is_empty());
+    assert!(of(turned(&whole)).is_inside_out(0) && of(turned(&whole)).open().is_empty());
     // A mirrored instance.
     let mirrored =
         scene().mesh(whole, [v(-1.0, 1.0, 2.0), v(10.0, 20.0, 30.0), v(5.0, 0.0, 1.0)], glass(1.5));
-    assert_eq!(bodies(&mirrored), Bodies::default());
+    assert_eq!(bodies(&mirrored), GlassSolids::default());
 }
 
 #[test]
@@ -578,11 +578,14 @@ fn a_mesh_that_looks_inwards_in_a_mesh_of_its_glass_is_a_cavity() {
     let two = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
     let two = two.mesh(turned(&at(0.3, -0.5)), AS_IT_IS, material.clone());
     let two = bodies(&two.mesh(turned(&at(0.3, 0.5)), AS_IT_IS, material.clone()));
-    assert_eq!([0, 1, 2].map(|object| (two.place(object), two.is_turned(object))), [(2, false); 3]);
+    assert_eq!([0, 1, 2].map(|object| (two.place(object), two.is_inside_out(object))), [(2, false); 3]);
     for (other, x) in [(material.clone(), 0.9), (tinted(1.0, v(0.4, 0.9, 0.25)), 0.5)] {
         let build = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
         let own = bodies(&build.mesh(turned(&at(0.3, x)), AS_IT_IS, other));
-        assert_eq!([0, 1].map(|object| (own.place(object), own.is_turned(object))), [(0, false), (1, true)]);
+        assert_eq!(
+            [0, 1].map(|object| (own.place(object), own.is_inside_out(object))),
+            [(0, false), (1, true)]
+        );
     }
 }
 

@@ -3,7 +3,7 @@
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
-use glimt::lights::Receivers;
+use glimt::lights::SamplingMode;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use glimt::scene::description::{Light, Shadows, Shape};
@@ -86,8 +86,8 @@ fn picks_among_lights_of_every_kind_bring_what_all_of_them_do() {
     let build = every_kind(room(phong(0.4, 0.3, 200.0, 0.0)));
     let picked = with_dark_lights(build.clone());
     assert!(
-        build.world().lights.selection(Receivers::Eye).is_none()
-            && picked.world().lights.selection(Receivers::Eye).is_some()
+        build.world().lights.sampler(SamplingMode::Eye).is_none()
+            && picked.world().lights.sampler(SamplingMode::Eye).is_some()
     );
     for (shadows, samples) in [(Shadows::Soft, 1), (Shadows::Soft, 2), (Shadows::Hard, 1), (Shadows::Off, 1)]
     {
@@ -173,7 +173,7 @@ fn a_mesh_of_thousands_of_uneven_lamps_lights_as_each_of_them_alone() {
         ..TriangleMesh::default()
     };
     let mesh = room(matte(0.7)).mesh(mesh, AS_IT_IS, emitter(20.0));
-    assert!(mesh.world().lights.selection(Receivers::Eye).is_none(), "a mesh is one light");
+    assert!(mesh.world().lights.sampler(SamplingMode::Eye).is_none(), "a mesh is one light");
     assert_same("whitted", &mesh.clone().shadows(Shadows::Soft, 8), &alone, (64, 16), 5e-3);
     assert_same("path", &by_paths(mesh, 2), &by_paths(alone, 2), (64, 24), 1e-2);
 }

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::lights::Receivers;
+use glimt::lights::SamplingMode;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{EmissionSource, Integrator, Material, Shape, TextureFilter, Wrap};
@@ -197,7 +197,7 @@ fn picked_lamps_have_their_textures() {
             }
         }
     }
-    assert!(build.world().lights.selection(Receivers::Eye).is_some());
+    assert!(build.world().lights.sampler(SamplingMode::Eye).is_some());
     for (name, build) in [("whitted", build.clone()), ("path", by_paths(&build))] {
         assert_irradiance(name, &build, expected);
     }

@@ -7,7 +7,7 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Ray, SurfacePoint};
 use glimt::integrators::render_tile;
-use glimt::lights::Source;
+use glimt::lights::LightObject;
 use glimt::materials::fresnel::dielectric;
 use glimt::math::transform::Transform;
 use glimt::math::{DVec3, Vec3};
@@ -257,7 +257,7 @@ fn a_closed_mesh_has_no_leaks() {
             let origin = (center + random.direction() * random.unit()).as_vec3();
             let ray = Ray::new(origin, (target - origin.as_dvec3()).as_vec3());
             leaks += u32::from(world.geometry.closest(&ray).is_none());
-            leaks += u32::from(!world.geometry.occluded(&ray, Source::Nothing));
+            leaks += u32::from(!world.geometry.occluded(&ray, LightObject::Nothing));
         }
         assert_eq!(leaks, 0, "at {center}");
     }
@@ -376,7 +376,7 @@ fn rays_that_are_no_rays_hit_nothing() {
             direction.direction[axis] = bad;
             for ray in [origin, direction] {
                 assert_eq!(world.geometry.closest(&ray), None, "{ray:?}");
-                assert!(!world.geometry.occluded(&ray, Source::Nothing), "{ray:?}");
+                assert!(!world.geometry.occluded(&ray, LightObject::Nothing), "{ray:?}");
             }
         }
     }
@@ -413,7 +413,7 @@ fn the_tree_finds_what_a_look_at_every_shape_finds() {
         let nearest = one_by_one.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         found += u32::from(nearest.is_some());
         assert_eq!(world.geometry.closest(&ray), nearest, "{ray:?}");
-        assert_eq!(world.geometry.occluded(&ray, Source::Nothing), nearest.is_some());
+        assert_eq!(world.geometry.occluded(&ray, LightObject::Nothing), nearest.is_some());
     }
     assert!(found > 20_000);
 }

@@ -17,7 +17,9 @@ use glimt::scene::description::{
     Located, Material, MaterialKind, Mesh, MeshFile, NumberSource, Object, OpacitySource, Photons,
     PixelFilter, Placement, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, UvSet, Wrap,
 };
-use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
+use glimt::world::{
+    Geometry, Image, MeshTree, TextureNeeds, World, WorldInputs, lights, origin, sky, textures_needed,
+};
 
 use super::v;
 
@@ -25,7 +27,7 @@ use super::v;
 #[derive(Clone)]
 pub struct Build {
     pub scene: Scene,
-    pub parts: Parts,
+    pub parts: WorldInputs,
     pub view: View,
     texels: Vec<Arc<Texels>>,
     sky: Option<Arc<Texels>>,
@@ -63,7 +65,7 @@ pub fn scene() -> Build {
         lights: Vec::new(),
         environment: None,
     };
-    Build { scene, parts: Parts::default(), view: View::Beauty, texels: Vec::new(), sky: None }
+    Build { scene, parts: WorldInputs::default(), view: View::Beauty, texels: Vec::new(), sky: None }
 }
 
 /// An angle of view in which a pixel is a point.
@@ -224,7 +226,7 @@ impl Build {
 
     pub fn world(&self) -> World {
         let mut parts = self.parts.clone();
-        for needed in textures_needed(&self.scene, &[], Lookups::ALL) {
+        for needed in textures_needed(&self.scene, &[], TextureNeeds::ALL) {
             let texels = match needed.declared {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("a map of the environment"),

@@ -32,7 +32,7 @@ const PAIRS: [(&str, &str, &str); 9] = [
         "contents are shared with the outputs, whose contents tell whether they are lost",
     ),
     ("world/geometry", "world/isolated", "the geometry keeps what is found out of it"),
-    ("world/mesh_instance", "world/mesh_rows", "rows of hits and single hits are interpolated alike"),
+    ("world/mesh_instance", "world/mesh_packet", "packets and single hits are interpolated identically"),
 ];
 
 /// Rooms that have larger circles for now. To be removed with the last of these.

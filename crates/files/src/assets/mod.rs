@@ -10,7 +10,7 @@ mod read;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
-use crate::materials::PixelNumber;
+use crate::materials::PixelValue;
 use crate::math::{DVec2, Vec2, Vec3};
 
 /// Reasons for which a file could not be used.
@@ -174,7 +174,7 @@ pub struct FileTexture {
     /// Summand and factor of the values, `-mm`.
     pub range: (f32, f32),
     /// The number of a pixel, if it is asked for: `-imfchan`.
-    pub number: Option<PixelNumber>,
+    pub number: Option<PixelValue>,
 }
 
 impl FileTexture {

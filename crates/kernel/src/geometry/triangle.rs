@@ -120,7 +120,7 @@ impl Exact for Triangle {
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
         let (normal, by_weights) = (ab.cross(ac), self.a + ab * u + ac * v);
-        // The weights are rounded to `f32`: where the triangle is huge, the ray gives a better point.
+        // On huge triangles, a point computed from the ray is more accurate than one from `f32` barycentric coordinates.
         let by_ray = ray.at((self.a - ray.origin).dot(normal) / ray.direction.dot(normal));
         let is_huge = ray.origin.abs().max(by_ray.abs()).max_element() * HUGE < reach;
         ExactPoint { point: if is_huge { by_ray } else { by_weights }, normal, reach }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_of_a_huge_triangle_is_on_the_ray() {
+    fn points_of_huge_triangles_are_on_the_ray() {
         let corner = |x: f64, z: f64| DVec3::new(x, 0.3 * x - 0.2 * z, z);
         for size in [1e5, 1e7, 1e9] {
             let [a, b, c] = [corner(-size, size), corner(size, size), corner(0.1, -size)];

@@ -1,56 +1,56 @@
-//! The lights side by side: each kind is a variant of [`Light`], and [`Light::family`] tells its trait.
+//! [`Light`]: an enum of all lights. [`Light::family`] returns the trait object for its kind.
 
 use super::area::{AreaLight, EmissionTexture};
 use super::delta::{DeltaLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
-use super::row::LightRow;
-use super::sample::{LightHit, LightSample, Middle, Source};
+use super::packet::LightSamplePacket;
+use super::sample::{LightCenter, LightHit, LightObject, LightSample};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 
 /// A light of any kind.
-// Most lights of a scene are shapes; they lie side by side.
+// Most lights of a scene are area lights, which should be contiguous in memory.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
-    /// A light without extent.
+    /// A point light.
     Point(PointLight),
-    /// A light without extent that emits into a cone.
+    /// A spotlight.
     Spot(SpotLight),
-    /// A light from beyond the scene, in one direction or a small disc.
+    /// A directional light, or a sun of small angular size.
     Directional(DirectionalLight),
-    /// An environment, from all around.
+    /// An environment light.
     Environment(Environment),
-    /// A shape that emits.
+    /// An emitting surface.
     Area(AreaLight),
 }
 
-/// A light by its family, in which all kinds have the same methods.
+/// A light as one of three families with common methods.
 #[derive(Clone, Copy)]
-pub enum Family<'a> {
+pub enum LightFamily<'a> {
     /// A light without extent.
     Delta(&'a dyn DeltaLight),
-    /// A light from beyond the scene.
+    /// A light at infinity.
     Infinite(&'a dyn InfiniteLight),
-    /// A shape that emits.
+    /// An emitting surface.
     Area(&'a AreaLight),
 }
 
 impl Light {
-    /// The light by its family.
-    pub fn family(&self) -> Family<'_> {
+    /// The light's family.
+    pub fn family(&self) -> LightFamily<'_> {
         match self {
-            Self::Point(light) => Family::Delta(light),
-            Self::Spot(light) => Family::Delta(light),
-            Self::Directional(light) => Family::Infinite(light),
-            Self::Environment(light) => Family::Infinite(light),
-            Self::Area(light) => Family::Area(light),
+            Self::Point(light) => LightFamily::Delta(light),
+            Self::Spot(light) => LightFamily::Delta(light),
+            Self::Directional(light) => LightFamily::Infinite(light),
+            Self::Environment(light) => LightFamily::Infinite(light),
+            Self::Area(light) => LightFamily::Area(light),
         }
     }
 
-    /// Samples its light at a point of a surface with this normal, by numbers in [0, 1). `None` if the chosen point sends
-    /// nothing there.
+    /// Samples the light for a surface point with this normal. `u` is in [0, 1)². Returns `None` if the sampled point does not
+    /// illuminate the surface.
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(point),
@@ -61,9 +61,15 @@ impl Light {
         }
     }
 
-    /// [`Light::sample`] for the points whose bits are set, each by its own numbers; without an emission texture.
+    /// [`Light::sample`] for the points in mask `used`, without an emission texture.
     #[inline(always)]
-    pub fn sample_row(&self, points: &Vec3x16, normals: &Vec3x16, used: u32, u: &[F32x16; 2]) -> LightRow {
+    pub fn sample_row(
+        &self,
+        points: &Vec3x16,
+        normals: &Vec3x16,
+        used: u32,
+        u: &[F32x16; 2],
+    ) -> LightSamplePacket {
         match self {
             Self::Point(light) => light.sample_row(points),
             Self::Spot(light) => light.sample_row(points),
@@ -73,15 +79,14 @@ impl Light {
         }
     }
 
-    /// Inverse pdfs in sr of samples of this light. 0 if nothing arrives, and for a light without extent, which no other
-    /// technique finds.
+    /// Inverse light-sampling pdfs in sr. 0 for dark samples, and for delta lights, which no other technique can sample.
     #[inline(always)]
-    pub fn inverse_densities(&self, samples: &LightRow) -> F32x16 {
+    pub fn inverse_pdfs(&self, samples: &LightSamplePacket) -> F32x16 {
         let mut inverse = [0.0; PACKET_SIZE];
         match self {
             Self::Point(_) | Self::Spot(_) => {}
-            Self::Directional(light) => inverse = [light.inverse_density(); PACKET_SIZE],
-            Self::Environment(_) => inverse = samples.of_sky,
+            Self::Directional(light) => inverse = [light.inverse_pdf(); PACKET_SIZE],
+            Self::Environment(_) => inverse = samples.environment_inverse_pdfs,
             Self::Area(light) => {
                 let of_radiance = 1.0 / light.radiance.max_element();
                 for i in 0..PACKET_SIZE {
@@ -92,13 +97,13 @@ impl Light {
         inverse
     }
 
-    /// Inverse pdf as [`Light::inverse_densities`], from the direction and the weight of a sample.
+    /// [`Light::inverse_pdfs`] for one sample, from its direction and weight.
     #[inline(always)]
-    pub(super) fn inverse_density(&self, direction: Vec3, weight: Vec3) -> f32 {
+    pub(super) fn inverse_pdf(&self, direction: Vec3, weight: Vec3) -> f32 {
         match self {
             Self::Point(_) | Self::Spot(_) => 0.0,
-            Self::Directional(light) => light.inverse_density(),
-            Self::Environment(light) => light.inverse_density(direction),
+            Self::Directional(light) => light.inverse_pdf(),
+            Self::Environment(light) => light.inverse_pdf(direction),
             Self::Area(light) => weight.max_element() / light.radiance.max_element(),
         }
     }
@@ -107,61 +112,63 @@ impl Light {
 impl Light {
     /// [`Light::sample`] without an emission texture.
     #[inline]
-    pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self.as_area() {
-            Some(light) => light.plain_sample(point, normal, u),
+            Some(light) => light.sample_untextured(point, normal, u),
             None => self.sample(point, normal, u),
         }
     }
 
-    /// Light-sampling pdf in sr⁻¹ of a hit's direction, for the point `from` of a surface with this normal; 0 if the light is
-    /// never sampled there, or no ray can hit it.
+    /// Light-sampling pdf of a hit's direction in sr⁻¹, from the surface point `from` with this normal. 0 if light sampling never
+    /// yields that direction, or if no ray can hit the light.
     #[inline]
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
     }
 
-    /// Bounds of its position and emission, for a [`LightTree`](super::LightTree). `None` if it emits nothing.
+    /// Bounds of its position and emission for a [`LightTree`](super::LightTree). `None` if it emits nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
         let bounds = match self.family() {
-            Family::Delta(light) => light.bounds(),
-            Family::Infinite(light) => light.bounds(),
-            Family::Area(light) => light.bounds,
+            LightFamily::Delta(light) => light.bounds(),
+            LightFamily::Infinite(light) => light.bounds(),
+            LightFamily::Area(light) => light.bounds,
         };
         Some(bounds).filter(|bounds| bounds.power > 0.0)
     }
 
-    /// Emission texture, by which its radiance is multiplied from point to point. `None` if it has none.
+    /// The emission texture that modulates its radiance. `None` without one.
     #[inline(always)]
     pub fn emission_texture(&self) -> Option<&EmissionTexture> {
         self.as_area().and_then(|light| light.texture.as_deref())
     }
 
-    /// Whether it comes from beyond the scene.
+    /// Whether the light is at infinity.
     pub fn is_beyond(&self) -> bool {
-        matches!(self.family(), Family::Infinite(_))
+        matches!(self.family(), LightFamily::Infinite(_))
     }
 
-    /// Whether it is an environment.
-    pub fn is_from_all_around(&self) -> bool {
+    /// Whether it is an environment light.
+    pub fn is_environment(&self) -> bool {
         self.as_environment().is_some()
     }
 
-    /// Whether its light arrives in a single direction.
+    /// Whether its light arrives from a single direction.
     pub fn is_single(&self) -> bool {
         match self.family() {
-            Family::Delta(_) => true,
-            Family::Infinite(light) => light.is_sharp(),
-            Family::Area(_) => false,
+            LightFamily::Delta(_) => true,
+            LightFamily::Infinite(light) => light.is_sharp(),
+            LightFamily::Area(_) => false,
         }
     }
 
-    /// Middle of the light, and the objects that a ray to there ignores: the light itself. `None` for an environment.
-    pub fn middle(&self) -> Option<(Middle, Source)> {
+    /// The light's center, and the light itself, which a ray toward it must ignore. `None` for an environment.
+    pub fn middle(&self) -> Option<(LightCenter, LightObject)> {
         Some(match self.family() {
-            Family::Delta(light) => (Middle::At(light.brightest().position.as_vec3()), Source::Nothing),
-            Family::Infinite(light) => (Middle::Towards(light.middle()?), Source::Nothing),
-            Family::Area(light) => (Middle::At(light.middle().as_vec3()), light.source()),
+            LightFamily::Delta(light) => {
+                (LightCenter::At(light.isotropic().position.as_vec3()), LightObject::Nothing)
+            }
+            LightFamily::Infinite(light) => (LightCenter::Towards(light.middle()?), LightObject::Nothing),
+            LightFamily::Area(light) => (LightCenter::At(light.middle().as_vec3()), light.source()),
         })
     }
 
@@ -176,12 +183,12 @@ impl Light {
         if let Self::Directional(light) = self { Some(light) } else { None }
     }
 
-    /// The environment. `None` for other kinds.
+    /// The environment light. `None` for other kinds.
     pub(super) fn as_environment(&self) -> Option<&Environment> {
         if let Self::Environment(light) = self { Some(light) } else { None }
     }
 
-    /// The shape that emits. `None` for other kinds.
+    /// The area light. `None` for other kinds.
     #[inline(always)]
     pub fn as_area(&self) -> Option<&AreaLight> {
         if let Self::Area(light) = self { Some(light) } else { None }

@@ -1,67 +1,67 @@
-//! Samples of the light that arrives at a point, and points of lights that rays hit.
+//! Light samples, and points on lights hit by rays.
 
 use crate::math::Vec3;
 
-/// A sample of the light that arrives at a point.
+/// A sample of the light arriving at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// End of the shadow ray.
-    pub end: End,
+    pub end: ShadowRayEnd,
     /// Unit direction to the light.
     pub direction: Vec3,
-    /// Radiance over the pdf of the direction in sr⁻¹: times f and the cosine, it is the contribution. For lights
-    /// without extent, irradiance at normal incidence.
+    /// Radiance divided by the pdf of the direction in sr⁻¹; multiplied by the BSDF and the cosine, it is the contribution. For
+    /// delta lights, the irradiance at normal incidence.
     pub weight: Vec3,
-    /// Objects that the shadow ray ignores: the light itself.
-    pub source: Source,
+    /// Geometry that the shadow ray ignores: the light itself.
+    pub source: LightObject,
 }
 
 /// End of a shadow ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum End {
+pub enum ShadowRayEnd {
     /// A point, in world coordinates.
     At(Vec3),
-    /// A place beyond everything in the scene.
+    /// A point beyond the entire scene.
     Beyond,
 }
 
-/// Position of the middle of a light.
+/// Position of a light's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Middle {
+pub enum LightCenter {
     /// A point, in world coordinates.
     At(Vec3),
-    /// A place beyond everything, in this unit direction.
+    /// At infinity, in this unit direction.
     Towards(Vec3),
 }
 
-/// The part of the scene that a light is.
+/// The scene geometry that a light consists of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// Nothing that can be hit.
+pub enum LightObject {
+    /// No geometry.
     Nothing,
-    /// A convex object: no ray to its near side hits it before.
+    /// A convex object, which never blocks a ray to its near side.
     Object(u32),
-    /// A place of an object that light may pass; other parts of the object may weaken a ray to it.
-    Sheer(u32),
+    /// A surface point on a see-through object, other parts of which may attenuate a ray to it.
+    SeeThrough(u32),
     /// One primitive of an object.
     Primitive(u32, u32),
 }
 
-/// A point of a light that a ray from elsewhere hits.
+/// A point on a light that a ray has hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightHit {
     /// Unit direction of the ray.
     pub direction: Vec3,
     /// Distance to the point.
     pub distance: f32,
-    /// Unit normal of the light's front there.
+    /// Unit normal on the light's front side.
     pub normal: Vec3,
-    /// Number of the primitive that was hit.
+    /// Index of the hit primitive.
     pub primitive: u32,
 }
 
 impl LightHit {
-    /// Pdf in sr⁻¹ of directions to points that are uniform over an area; 0 from behind.
+    /// Solid-angle pdf in sr⁻¹ of points sampled uniformly over an area; 0 from behind.
     pub(super) fn pdf_by_area(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);
         if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }

@@ -1,113 +1,112 @@
-//! All lights of a scene, and the map from hits to lights.
+//! All lights of a scene, and the mapping from hits to lights.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::area::{AreaLight, MeshEmitter, Part, Side};
+use super::area::{AreaLight, LightPart, MeshEmitter, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
-use super::tree::{Cut, LightTree, MOST_WITHOUT, Receiver};
+use super::tree::{LightTree, LightTreeCut, MAX_WITHOUT_TREE, Receiver};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// The lights of a scene, which an index names.
+/// The lights of a scene, by index.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
     all: Vec<Light>,
-    /// Lights of the fronts of objects.
-    by_object: HashMap<u32, OfObject>,
-    /// Lights of the backs of objects.
-    by_back: HashMap<u32, OfObject>,
-    /// Directional lights, which rays see that leave the scene, with their numbers.
+    /// Lights on the fronts of objects.
+    by_object: HashMap<u32, ObjectLights>,
+    /// Lights on the backs of objects.
+    by_back: HashMap<u32, ObjectLights>,
+    /// Directional lights with an extent, which rays that leave the scene can see, with their indices.
     suns: Vec<(u32, DirectionalLight)>,
-    /// The environment, with its number.
+    /// The environment light, with its index.
     environment: Option<(u32, Environment)>,
-    /// Tree over all lights. `None` if they are few.
+    /// Tree over all lights. `None` if there are few.
     tree: Option<Arc<LightTree>>,
-    /// Tree over the lights in the scene, without those beyond. `None` if paths sample all of them.
-    tree_of_lamps: Option<Arc<LightTree>>,
+    /// Tree over all lights except those at infinity. `None` if paths sample all of them.
+    local_tree: Option<Arc<LightTree>>,
 }
 
 /// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Receivers {
-    /// Direct light in the picture, which has no other noise.
+pub enum SamplingMode {
+    /// Direct lighting only: the image has no other noise.
     Eye,
-    /// Vertices of paths, whose light has other noise as well.
+    /// Path vertices, whose light has other noise as well.
     Paths,
 }
 
-/// Set of lights from which vertices pick some.
+/// The lights from which a vertex picks some to sample.
 #[derive(Clone, Copy, Debug)]
-pub struct Selection<'a> {
+pub struct LightSampler<'a> {
     /// Tree over the lights to pick from.
     pub tree: &'a LightTree,
-    /// Effort of picking.
-    pub picks: Picks,
-    /// Whether light from beyond the scene is outside of the tree, and is sampled at every vertex: its bounds ignore what the scene
-    /// occludes.
+    /// How much work to spend on picking.
+    pub picks: LightSamplingEffort,
+    /// Whether lights at infinity are not in the tree but are sampled at every vertex, because their bounds ignore occlusion.
     pub leaves_beyond: bool,
 }
 
-/// Effort of picking lights at a vertex, if not all of them are sampled.
+/// How much work to spend on picking lights at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Picks {
-    /// Lights that a vertex picks for each requested light sample.
+pub struct LightSamplingEffort {
+    /// Number of lights to pick per requested light sample.
     pub count: u32,
-    /// Most nodes of the tree that it examines for all of them.
+    /// Maximum number of tree nodes to examine for all of them.
     nodes: usize,
 }
 
-impl Picks {
-    /// Picks for direct light alone: as good as examining each of a thousand lights.
-    pub const BY_EYE: Self = Self { count: MOST_WITHOUT as u32, nodes: Cut::MOST };
+impl LightSamplingEffort {
+    /// For direct lighting: as good as examining each of a thousand lights.
+    pub const DIRECT: Self = Self { count: MAX_WITHOUT_TREE as u32, nodes: LightTreeCut::MOST };
 
-    /// Picks for paths, which have other noise as well: more rays cost more than they gain.
-    pub const BY_PATHS: Self = Self { count: 1, nodes: 8 };
+    /// For paths, which have other noise: more shadow rays cost more than they gain.
+    pub const PATHS: Self = Self { count: 1, nodes: 8 };
 
-    /// The cut of a tree for these picks.
+    /// A cut of a tree with this effort.
     #[inline(always)]
-    pub fn cut(self, tree: &LightTree) -> Cut<'_> {
-        Cut::new(tree, self.nodes)
+    pub fn cut(self, tree: &LightTree) -> LightTreeCut<'_> {
+        LightTreeCut::new(tree, self.nodes)
     }
 }
 
-/// Expected number of light samples at a vertex, for each requested one.
-pub struct Samples<'a>(Option<(Selection<'a>, Cut<'a>)>);
+/// Expected number of samples per light at a vertex, for each requested sample.
+pub struct ExpectedSamples<'a>(Option<(LightSampler<'a>, LightTreeCut<'a>)>);
 
-impl Samples<'_> {
-    /// Expected number of samples of the light of this number.
+impl ExpectedSamples<'_> {
+    /// Expected number of samples of a light.
     #[inline]
     pub fn of(&self, number: u32) -> f32 {
-        self.0.as_ref().map_or(1.0, |(selection, cut)| {
-            if selection.leaves_beyond && !selection.tree.has(number) {
+        self.0.as_ref().map_or(1.0, |(sampler, cut)| {
+            if sampler.leaves_beyond && !sampler.tree.has(number) {
                 1.0
             } else {
-                selection.picks.count as f32 * cut.probability(number)
+                sampler.picks.count as f32 * cut.probability(number)
             }
         })
     }
 }
 
-/// Lights of an object.
+/// The lights on one object.
 #[derive(Clone, Debug, PartialEq)]
-enum OfObject {
+enum ObjectLights {
     /// A single light.
     Whole(u32),
-    /// A light, or none, for each primitive.
+    /// A light for each primitive, if it emits.
     Primitives(Vec<Option<u32>>),
 }
 
 impl Lights {
-    /// The lights in this order.
+    /// Indexes the lights and builds the trees over them.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is cancelled.
+    /// [`Cancelled`] if the token is canceled.
     pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Cancelled> {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
             if let Some(light) = light.as_area() {
-                lights.note(number, light);
+                lights.index_light(number, light);
             } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_sharp()) {
                 lights.suns.push((number, *sun));
             } else if let Some(light) = light.as_environment() {
@@ -121,74 +120,76 @@ impl Lights {
             let bounds = all.iter().map(|light| light.bounds().filter(|_| taken(&light)));
             Ok(LightTree::new(&bounds.collect::<Vec<_>>(), token)?.map(Arc::new))
         };
-        lights.tree = tree_over(&|_| true, MOST_WITHOUT)?;
-        lights.tree_of_lamps = match &lights.tree {
+        lights.tree = tree_over(&|_| true, MAX_WITHOUT_TREE)?;
+        lights.local_tree = match &lights.tree {
             Some(tree) if all.iter().all(|light| !light.is_beyond()) => Some(tree.clone()),
-            Some(_) | None => tree_over(&|light| !light.is_beyond(), Self::MOST_BY_PATHS)?,
+            Some(_) | None => tree_over(&|light| !light.is_beyond(), Self::MAX_LOCAL_WITHOUT_TREE)?,
         };
         Ok(Self { all, ..lights })
     }
 
-    /// Most lamps of a scene whose paths sample all lamps at each vertex; of more, vertices pick one. Measured in rooms of 3 to
-    /// 12 lamps.
-    const MOST_BY_PATHS: usize = 3;
+    /// Maximum number of local lights for which path vertices sample all of them; with more, they pick one. Measured in rooms
+    /// with 3 to 12 lights.
+    const MAX_LOCAL_WITHOUT_TREE: usize = 3;
 
-    /// Set of lights from which vertices pick. `None` if they sample all lights.
-    pub fn selection(&self, receivers: Receivers) -> Option<Selection<'_>> {
+    /// How vertices pick lights. `None` if they sample all of them.
+    pub fn sampler(&self, receivers: SamplingMode) -> Option<LightSampler<'_>> {
         match receivers {
-            Receivers::Eye => {
-                let selection = |tree| Selection { tree, picks: Picks::BY_EYE, leaves_beyond: false };
-                self.tree.as_deref().map(selection)
+            SamplingMode::Eye => {
+                let sampler =
+                    |tree| LightSampler { tree, picks: LightSamplingEffort::DIRECT, leaves_beyond: false };
+                self.tree.as_deref().map(sampler)
             }
-            Receivers::Paths => {
-                let selection = |tree| Selection { tree, picks: Picks::BY_PATHS, leaves_beyond: true };
-                self.tree_of_lamps.as_deref().map(selection)
+            SamplingMode::Paths => {
+                let sampler =
+                    |tree| LightSampler { tree, picks: LightSamplingEffort::PATHS, leaves_beyond: true };
+                self.local_tree.as_deref().map(sampler)
             }
         }
     }
 
-    /// Expected number of light samples at a point of a surface with this normal, if nothing else is known of the surface.
+    /// Expected number of light samples at a surface point of which only position and normal are known.
     #[inline]
-    pub fn samples_at(&self, receivers: Receivers, point: Vec3, normal: Vec3) -> Samples<'_> {
-        // Without picks no cut is copied, which is large.
-        let Some(selection) = self.selection(receivers) else { return Samples(None) };
-        let mut cut = selection.picks.cut(selection.tree);
-        cut.go_to(&Receiver::plain(point, normal));
-        Samples(Some((selection, cut)))
+    pub fn samples_at(&self, receivers: SamplingMode, point: Vec3, normal: Vec3) -> ExpectedSamples<'_> {
+        // Return early: a cut is expensive to copy.
+        let Some(sampler) = self.sampler(receivers) else { return ExpectedSamples(None) };
+        let mut cut = sampler.picks.cut(sampler.tree);
+        cut.move_to(&Receiver::plain(point, normal));
+        ExpectedSamples(Some((sampler, cut)))
     }
 
-    /// Bytes of the trees over lights and over the triangles of lights.
+    /// Bytes of the trees over lights and over the triangles of mesh lights.
     pub fn memory_bytes(&self) -> usize {
         let of_mesh = |light: &Light| {
             let mesh = light.as_area().and_then(|light| light.shape.as_mesh());
             mesh.and_then(MeshEmitter::tree).map_or(0, LightTree::memory_bytes)
         };
-        let mut trees: Vec<_> = [&self.tree, &self.tree_of_lamps].into_iter().flatten().collect();
+        let mut trees: Vec<_> = [&self.tree, &self.local_tree].into_iter().flatten().collect();
         trees.dedup_by(|a, b| Arc::ptr_eq(a, b));
         trees.iter().map(|tree| tree.memory_bytes()).chain(self.all.iter().map(of_mesh)).sum()
     }
 
-    fn note(&mut self, number: u32, light: &AreaLight) {
+    fn index_light(&mut self, number: u32, light: &AreaLight) {
         let by_object = match light.side {
             Side::Front => &mut self.by_object,
             Side::Back => &mut self.by_back,
         };
-        let note = |primitive: u32| {
+        let index_light = |primitive: u32| {
             let place = primitive as usize;
-            match by_object.entry(light.object).or_insert(OfObject::Primitives(Vec::new())) {
-                OfObject::Whole(_) => {}
-                OfObject::Primitives(lights) => {
+            match by_object.entry(light.object).or_insert(ObjectLights::Primitives(Vec::new())) {
+                ObjectLights::Whole(_) => {}
+                ObjectLights::Primitives(lights) => {
                     lights.resize(lights.len().max(place + 1), None);
                     lights[place] = Some(number);
                 }
             }
         };
         match light.part {
-            Part::Whole => {
-                by_object.insert(light.object, OfObject::Whole(number));
+            LightPart::Whole => {
+                by_object.insert(light.object, ObjectLights::Whole(number));
             }
-            Part::Listed => {
-                light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(note);
+            LightPart::Listed => {
+                light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(index_light);
             }
         }
     }
@@ -203,49 +204,49 @@ impl Lights {
         self.all.is_empty()
     }
 
-    /// Whether a ray can hit a light.
-    pub fn can_be_found(&self) -> bool {
-        !self.by_object.is_empty() || self.are_beyond()
+    /// Whether rays can hit a light.
+    pub fn can_be_hit(&self) -> bool {
+        !self.by_object.is_empty() || self.has_infinite_lights()
     }
 
-    /// Whether an object emits, or a part of it.
+    /// Whether any part of an object emits.
     pub fn has_object(&self, object: u32) -> bool {
         self.by_object.contains_key(&object) || self.by_back.contains_key(&object)
     }
 
-    /// All lights with their numbers.
+    /// All lights with their indices.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)
     }
 
-    /// Whether a ray that leaves the scene may see light.
-    pub fn are_beyond(&self) -> bool {
+    /// Whether rays that leave the scene may find light.
+    pub fn has_infinite_lights(&self) -> bool {
         !self.suns.is_empty() || self.environment.is_some()
     }
 
-    /// The light from all around.
+    /// The environment light.
     pub fn environment(&self) -> Option<&Environment> {
         self.environment.as_ref().map(|(_, environment)| environment)
     }
 
-    /// Solid angle in sr of the widest light from beyond the scene; 0 if no such light has an extent.
-    pub fn extent_beyond(&self) -> f32 {
+    /// Solid angle in sr of the widest light at infinity; 0 if none has an extent.
+    pub fn infinite_solid_angle(&self) -> f32 {
         match self.environment {
             Some(_) => 4.0 * std::f32::consts::PI,
-            None => self.suns.iter().map(|(_, sun)| sun.inverse_density()).fold(0.0, f32::max),
+            None => self.suns.iter().map(|(_, sun)| sun.inverse_pdf()).fold(0.0, f32::max),
         }
     }
 
-    /// Radiance from beyond the scene, from a unit direction. `share` weights each light by its number and its light-sampling
-    /// pdf in sr⁻¹.
-    pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
+    /// Radiance arriving from infinity in a unit direction. `share` returns the weight of each light, given its index and its
+    /// light-sampling pdf in sr⁻¹.
+    pub fn radiance_from_infinity(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.arriving(direction));
-        self.beyond_with(sky, direction, share)
+        self.radiance_from_infinity_with(sky, direction, share)
     }
 
-    /// [`Lights::beyond_by_density`] with the result of [`Environment::arriving`].
-    pub fn beyond_with(
+    /// [`Lights::radiance_from_infinity`], given the result of [`Environment::arriving`].
+    pub fn radiance_from_infinity_with(
         &self,
         sky: Option<(Vec3, f32)>,
         direction: Vec3,
@@ -258,28 +259,28 @@ impl Lights {
         seen.map(|(number, (radiance, density))| radiance * share(number, density)).sum()
     }
 
-    /// The light of a number.
+    /// The light with an index.
     #[inline(always)]
     pub fn get(&self, number: u32) -> &Light {
         &self.all[number as usize]
     }
 
-    /// The light of a side of a primitive of an object, with its number.
+    /// The light on one side of an object's primitive, with its index.
     #[inline]
-    pub fn of_hit(&self, object: u32, primitive: u32, side: Side) -> Option<(u32, &Light)> {
+    pub fn light_at(&self, object: u32, primitive: u32, side: Side) -> Option<(u32, &Light)> {
         let by_object = match side {
             Side::Front => &self.by_object,
             Side::Back => &self.by_back,
         };
         let number = match by_object.get(&object)? {
-            OfObject::Whole(number) => *number,
-            OfObject::Primitives(lights) => lights.get(primitive as usize).copied().flatten()?,
+            ObjectLights::Whole(number) => *number,
+            ObjectLights::Primitives(lights) => lights.get(primitive as usize).copied().flatten()?,
         };
         Some((number, &self.all[number as usize]))
     }
 }
 
-/// Number of these lights; all lights of one object count as one.
+/// Number of lights, where all lights on one object count as one.
 fn count<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();

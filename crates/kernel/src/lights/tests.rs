@@ -1,4 +1,4 @@
-//! Pdfs of samples, and the map from a hit back to its light.
+//! Tests of light-sampling pdfs, and of the mapping from hits to lights.
 
 use super::*;
 use crate::control::CancelToken;
@@ -45,27 +45,27 @@ fn lights_of(shape: &Shape) -> Lights {
 const POINT: PointLight =
     PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: Falloff::Square };
 
-/// The hit of a ray from a point on a shape.
-pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
+/// The hit of a ray on a shape.
+pub fn light_hit(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
     let normal = shape.surface(&ray, &hit).normal;
     Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
-/// Samples of a light for a point: directions, their ends, and inverse pdfs.
+/// Samples of a light from a point: directions, targets and inverse pdfs.
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
     let one = |sample: u32| {
         let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(number));
         let sample = light.sample(from, Vec3::Y, u.to_array())?;
-        let End::At(target) = sample.end else { return None };
+        let ShadowRayEnd::At(target) = sample.end else { return None };
         Some((sample.direction, target, sample.weight.x))
     };
     (0..count).filter_map(one).collect()
 }
 
 #[test]
-fn rows_hold_the_samples_of_their_points() {
+fn packet_samples_equal_single_samples() {
     let mut state = 1_u32;
     let mut next = || {
         state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
@@ -85,14 +85,14 @@ fn rows_hold_the_samples_of_their_points() {
                     continue;
                 };
                 assert_eq!((weight, lane(&row.directions, i)), (alone.weight, alone.direction), "{shape:?}");
-                assert_eq!(End::At(lane(&row.targets, i)), alone.end, "{shape:?}");
+                assert_eq!(ShadowRayEnd::At(lane(&row.targets, i)), alone.end, "{shape:?}");
             }
         }
     }
 }
 
 #[test]
-fn lights_that_each_point_picked_give_the_samples_of_each_alone() {
+fn per_lane_lights_equal_single_samples() {
     let quad = |at: f64| {
         let corner = |x: f64, y: f64| DVec3::new(at + x, y, 2.0);
         mesh_light(&[
@@ -120,7 +120,7 @@ fn lights_that_each_point_picked_give_the_samples_of_each_alone() {
             std::array::from_fn(|i| 6.0 * at(axis * PACKET_SIZE + i, Dimension::Lobe).x - 3.0)
         });
         let normals: Vec3x16 = [[0.0; PACKET_SIZE], [1.0; PACKET_SIZE], [0.0; PACKET_SIZE]];
-        let (row, inverse, _) = lights.sample_each(&picked, (&points, &normals), used, &u);
+        let (row, inverse, _) = lights.sample_per_lane(&picked, (&points, &normals), used, &u);
         for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             let light = &all[picked[i] as usize];
             let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
@@ -129,8 +129,11 @@ fn lights_that_each_point_picked_give_the_samples_of_each_alone() {
                 continue;
             };
             assert_eq!((lane(&row.weights, i), lane(&row.directions, i)), (alone.weight, alone.direction));
-            assert_eq!((End::At(lane(&row.targets, i)), row.sources.source(i)), (alone.end, alone.source));
-            assert_eq!(inverse[i] > 0.0, picked[i] > 0, "a point has no other way to be found");
+            assert_eq!(
+                (ShadowRayEnd::At(lane(&row.targets, i)), row.sources.source(i)),
+                (alone.end, alone.source)
+            );
+            assert_eq!(inverse[i] > 0.0, picked[i] > 0, "point lights have no other technique");
             seen += 1;
         }
     }
@@ -142,24 +145,24 @@ fn points() -> [Vec3; 3] {
 }
 
 #[test]
-fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
+fn sample_pdf_equals_pdf_of_its_hit() {
     for shape in shapes() {
         let lights = lights_of(&shape);
         let (mut compared, mut hidden) = (0, 0);
         for from in points() {
-            // The first is the point light.
+            // Skip the point light.
             for (number, light) in lights.iter().skip(1) {
                 for (direction, target, factor) in samples(light, number, from, 64) {
-                    let Some((met, hit)) = met(&shape, from, direction) else { continue };
+                    let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
                     // A torus may occlude the point, and a ray may miss the very edge of a shape.
-                    if (from + direction * met.distance - target).length() > 1e-3 {
+                    if (from + direction * light_hit.distance - target).length() > 1e-3 {
                         hidden += 1;
                         continue;
                     }
-                    let (found, of_hit) =
-                        lights.of_hit(OBJECT, hit.primitive, Side::Front).expect("it is a light");
+                    let (found, light_at) =
+                        lights.light_at(OBJECT, hit.primitive, Side::Front).expect("the object is a light");
                     assert_eq!(found, number, "{shape:?}");
-                    let product = of_hit.pdf(from, Vec3::Y, &met) * factor;
+                    let product = light_at.pdf(from, Vec3::Y, &light_hit) * factor;
                     assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                     compared += 1;
                 }
@@ -169,7 +172,7 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
     }
 }
 
-/// Lights of both sides of a shape, the front's first.
+/// Lights on both sides of a shape, the front first.
 fn two_sided(shape: &Shape) -> Lights {
     let both = [area_light(shape, Vec3::ONE, OBJECT), back_light(shape, Vec3::ONE, OBJECT)];
     let all = both.into_iter().flatten().map(Light::Area).collect();
@@ -177,7 +180,7 @@ fn two_sided(shape: &Shape) -> Lights {
 }
 
 #[test]
-fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
+fn two_sided_samples_cover_the_visible_shape() {
     let open = |cylinder| {
         if cylinder {
             Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false))
@@ -187,7 +190,7 @@ fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
     };
     for shape in shapes().into_iter().chain([open(true), open(false)]) {
         let lights = two_sided(&shape);
-        // Points around it, and one inside of it.
+        // Points around the shape, and one inside.
         let is_flat = area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
         let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
@@ -197,18 +200,18 @@ fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
             let around = SphereCone { one_minus_cos: 2.0, ..around };
             for i in 0..n {
                 let direction = around.direction(i, n);
-                let Some((met, hit)) = met(&shape, from, direction) else { continue };
-                let side = if met.normal.dot(direction) < 0.0 { Side::Front } else { Side::Back };
-                let Some((_, light)) = lights.of_hit(OBJECT, hit.primitive, side) else { continue };
+                let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
+                let side = if light_hit.normal.dot(direction) < 0.0 { Side::Front } else { Side::Back };
+                let Some((_, light)) = lights.light_at(OBJECT, hit.primitive, side) else { continue };
                 let part = f64::from(around.solid_angle()) / f64::from(n);
                 seen += part;
-                sum += if light.pdf(from, Vec3::Y, &met) > 0.0 { part } else { 0.0 };
+                sum += if light.pdf(from, Vec3::Y, &light_hit) > 0.0 { part } else { 0.0 };
             }
             assert!(
                 (sum - seen).abs() <= 1e-3 * seen,
                 "{shape:?} from {from}: {sum} of {seen} sr are sampled"
             );
-            // The weights of the samples add up to the same solid angle.
+            // The weights of the samples must add up to the same solid angle.
             let found: f64 = lights
                 .iter()
                 .map(|(number, light)| {
@@ -225,7 +228,7 @@ fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
 }
 
 #[test]
-fn the_density_of_a_sample_of_a_back_is_that_of_its_hit() {
+fn back_sample_pdf_equals_pdf_of_its_hit() {
     let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false));
     for shape in shapes().into_iter().chain([tube]) {
         let light = Light::Area(back_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
@@ -234,12 +237,12 @@ fn the_density_of_a_sample_of_a_back_is_that_of_its_hit() {
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain([inner]) {
             for (direction, target, factor) in samples(&light, 0, from, 256) {
-                let Some((met, _)) = met(&shape, from, direction) else { continue };
-                if (from + direction * met.distance - target).length() > 1e-3 {
+                let Some((light_hit, _)) = light_hit(&shape, from, direction) else { continue };
+                if (from + direction * light_hit.distance - target).length() > 1e-3 {
                     continue;
                 }
-                assert!(met.normal.dot(direction) > 0.0, "{shape:?}: a sample of the front");
-                let product = light.pdf(from, Vec3::Y, &met) * factor;
+                assert!(light_hit.normal.dot(direction) > 0.0, "{shape:?}: sampled the front");
+                let product = light.pdf(from, Vec3::Y, &light_hit) * factor;
                 assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
                 compared += 1;
             }
@@ -249,30 +252,29 @@ fn the_density_of_a_sample_of_a_back_is_that_of_its_hit() {
 }
 
 #[test]
-fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
+fn pdfs_integrate_to_one_over_the_light() {
     for shape in shapes() {
         let lights = lights_of(&shape);
-        let around = shape.bounds().expect("it has an end");
+        let around = shape.bounds().expect("a finite shape");
         let reach = around.extent().length() * 0.5 + (around.center() - shape.centroid().as_vec3()).length();
         for from in points() {
-            // Directions in a cone around the shape.
+            // Sample directions in a cone around the shape.
             let to_middle = shape.centroid() - from.as_dvec3();
             let sin = (f64::from(reach) / to_middle.length()).min(1.0) as f32;
             let cone = SphereCone::new(to_middle.as_vec3(), sin);
             let (mut sums, n) = (vec![0.0; lights.len()], 200_000);
             for i in 0..n {
                 let direction = cone.direction(i, n);
-                let Some((met, hit)) = met(&shape, from, direction) else { continue };
-                let Some((number, light)) = lights.of_hit(OBJECT, hit.primitive, Side::Front) else {
+                let Some((light_hit, hit)) = light_hit(&shape, from, direction) else { continue };
+                let Some((number, light)) = lights.light_at(OBJECT, hit.primitive, Side::Front) else {
                     continue;
                 };
                 sums[number as usize] +=
-                    f64::from(light.pdf(from, Vec3::Y, &met) * cone.solid_angle()) / f64::from(n);
+                    f64::from(light.pdf(from, Vec3::Y, &light_hit) * cone.solid_angle()) / f64::from(n);
             }
             for (sum, (number, light)) in sums.iter().zip(lights.iter()).skip(1) {
                 let all = samples(light, number, from, 1024);
-                // Of samples by area, those on the back count for nothing: the visible ones sum to the part that faces
-                // the point.
+                // With area sampling, samples on the back are lost: the visible ones sum to the fraction that faces the point.
                 let expected = all.len() as f64 / 1024.0;
                 assert!(
                     (sum - expected).abs() < 0.03,
@@ -283,7 +285,7 @@ fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
     }
 }
 
-/// Directions of a cone, evenly by solid angle.
+/// Directions in a cone, stratified by solid angle.
 struct SphereCone {
     frame: crate::math::frame::Frame,
     one_minus_cos: f32,
@@ -309,7 +311,7 @@ impl SphereCone {
 }
 
 #[test]
-fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
+fn mesh_triangles_map_to_their_lights() {
     let corners = |z: f64| [DVec3::new(0.0, 0.0, z), DVec3::new(1.0, 0.0, z), DVec3::new(0.0, 1.0, z)];
     let light = |numbers: &[u32], radiance: f32| {
         let triangles = numbers.iter().map(|&number| (corners(f64::from(number)), number)).collect();
@@ -322,39 +324,44 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
             radiance: Vec3::splat(radiance),
             texture: None,
             object: 3,
-            part: Part::Listed,
+            part: LightPart::Listed,
             side: Side::Front,
         })
     };
     let lights =
         Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)], &CancelToken::new())
             .expect("nobody cancels");
-    let of_hit = |object, primitive| lights.of_hit(object, primitive, Side::Front).map(|(number, _)| number);
+    let light_at =
+        |object, primitive| lights.light_at(object, primitive, Side::Front).map(|(number, _)| number);
     assert_eq!(
-        [0, 1, 2, 3, 4, 5].map(|triangle| of_hit(3, triangle)),
+        [0, 1, 2, 3, 4, 5].map(|triangle| light_at(3, triangle)),
         [Some(0), None, Some(2), None, Some(0), None]
     );
-    assert_eq!(of_hit(4, 0), None);
-    let met = LightHit { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
-    let (_, light) = lights.of_hit(3, 2, Side::Front).expect("a light");
+    assert_eq!(light_at(4, 0), None);
+    let light_hit = LightHit { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
+    let (_, light) = lights.light_at(3, 2, Side::Front).expect("a light");
     // d²/(A·cos) = 4/½.
-    assert!((light.pdf(Vec3::ZERO, Vec3::Z, &met) - 8.0).abs() < 1e-5);
-    assert_eq!(light.pdf(Vec3::ZERO, Vec3::Z, &LightHit { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
-    assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &met), 0.0);
+    assert!((light.pdf(Vec3::ZERO, Vec3::Z, &light_hit) - 8.0).abs() < 1e-5);
+    assert_eq!(
+        light.pdf(Vec3::ZERO, Vec3::Z, &LightHit { normal: Vec3::NEG_Z, ..light_hit }),
+        0.0,
+        "from behind"
+    );
+    assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &light_hit), 0.0);
 }
 
-/// A light of these triangles, numbered from 5 on.
+/// A light with these triangles, numbered from 5.
 fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let numbered = triangles.iter().copied().zip(5..).collect();
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");
     let bounds = mesh.bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
-    let (side, part) = (Side::Front, Part::Listed);
+    let (side, part) = (Side::Front, LightPart::Listed);
     AreaLight { shape, side, radiance, bounds, texture: None, object: OBJECT, part }
 }
 
 #[test]
-fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
+fn triangle_pairs_are_sampled_like_quads() {
     let (p, u, v) = (DVec3::new(0.3, -0.2, 0.1), DVec3::X, DVec3::new(0.0, 1.0, -0.5));
     let quad = Shape::Quad(Parallelogram::new(p, u, v));
     let quad = area_light(&quad, Vec3::ONE, OBJECT).expect("a light");
@@ -381,7 +388,8 @@ fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
                 (own.direction, own.weight, own.end),
                 (expected.direction, expected.weight, expected.end)
             );
-            let (Source::Primitive(OBJECT, part), End::At(target)) = (own.source, own.end) else {
+            let (LightObject::Primitive(OBJECT, part), ShadowRayEnd::At(target)) = (own.source, own.end)
+            else {
                 panic!("a point of a triangle")
             };
             let corners = if part == 5 { first } else { second };
@@ -389,29 +397,29 @@ fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
             let way = target - from;
             let inside = triangle.intersect(&Ray::new(from - 0.01 * way, way).to_f64()).is_some();
             let on_edge = (target.as_dvec3() - p).dot(u + v - u.dot(v) * u);
-            assert!(inside || (on_edge - 1.0).abs() < 0.3, "{target} is on triangle {part}");
+            assert!(inside || (on_edge - 1.0).abs() < 0.3, "{target} is not on triangle {part}");
             seen += u32::from(inside);
             parts[(part - 5) as usize] += 1;
-            let met = LightHit {
+            let light_hit = LightHit {
                 direction: own.direction,
                 distance: way.length(),
                 normal: u.cross(v).as_vec3(),
                 primitive: part,
             };
-            assert_eq!(light.pdf(from, Vec3::Z, &met), quad.pdf(from, Vec3::Z, &met));
+            assert_eq!(light.pdf(from, Vec3::Z, &light_hit), quad.pdf(from, Vec3::Z, &light_hit));
         }
     }
     assert!(seen > 400 && parts.iter().all(|&count| count > 100), "{seen} {parts:?}");
 }
 
 #[test]
-fn what_makes_no_parallelogram_is_sampled_by_area() {
+fn non_parallelograms_are_sampled_by_area() {
     let (o, x, y) = (DVec3::ZERO, DVec3::X, DVec3::Y);
     let first = [o, x, y];
     for (second, what) in [
-        ([x + y * 1.2, y, x], "a trapezium"),
+        ([x + y * 1.2, y, x], "a trapezoid"),
         ([x + y + DVec3::Z * 0.1, y, x], "a fold"),
-        ([x + y, x, y], "two that face away from each other"),
+        ([x + y, x, y], "opposite orientations"),
         ([x + y, y + x * 1e-3, x], "no common edge"),
         ([x + y, x * 2.0, y * 2.0], "one common corner at most"),
     ] {
@@ -423,7 +431,7 @@ fn what_makes_no_parallelogram_is_sampled_by_area() {
 }
 
 #[test]
-fn samples_by_area_fall_on_triangles_as_often_as_these_are_large() {
+fn area_samples_are_proportional_to_area() {
     let triangle = |at: f64, size: f64| {
         let p = DVec3::new(at, 0.0, 0.0);
         [p, p + DVec3::X * size, p + DVec3::Y * size]
@@ -434,7 +442,7 @@ fn samples_by_area_fall_on_triangles_as_often_as_these_are_large() {
     for sample in 0..COUNT {
         let u = PixelSampler::new(3, 1, 4, sample).pair(1, Dimension::ChosenLight);
         let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("seen from the front") };
-        let Source::Primitive(OBJECT, part) = sample.source else { panic!("a triangle of it") };
+        let LightObject::Primitive(OBJECT, part) = sample.source else { panic!("a triangle of it") };
         counts[(part - 5) as usize] += 1;
         flux += f64::from(sample.weight.x * -sample.direction.z) / f64::from(COUNT);
     }
@@ -442,7 +450,7 @@ fn samples_by_area_fall_on_triangles_as_often_as_these_are_large() {
         let expected = area / 2.625 * f64::from(COUNT);
         assert!((f64::from(*count) - expected).abs() < 5.0, "{counts:?}");
     }
-    // Lambert's formula for polygons: ½ Σ Θᵢ (Γᵢ · n).
+    // Lambert's formula for the irradiance from a polygon: ½ Σ Θᵢ (Γᵢ · n).
     let of = |corners: [DVec3; 3]| {
         let ways = corners.map(|corner| (corner - from.as_dvec3()).normalize());
         let edge = |i: usize| {
@@ -452,10 +460,10 @@ fn samples_by_area_fall_on_triangles_as_often_as_these_are_large() {
         0.5 * (edge(0) + edge(1) + edge(2)).abs()
     };
     let expected = of(triangle(0.0, 1.0)) + of(triangle(2.0, 2.0)) + of(triangle(5.0, 0.5));
-    assert!((flux / expected - 1.0).abs() < 1e-3, "{flux} where {expected} arrives");
+    assert!((flux / expected - 1.0).abs() < 1e-3, "{flux} is not {expected}");
 }
 
 #[test]
-fn a_plane_is_no_light() {
+fn planes_cannot_be_lights() {
     assert_eq!(area_light(&Shape::Plane(Plane::new(DVec3::ZERO, DVec3::Y)), Vec3::ONE, 0), None);
 }

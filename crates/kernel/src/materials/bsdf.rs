@@ -1,14 +1,14 @@
-//! The interface of rough BSDFs: lobes that are not δ, in rows of sixteen surfaces of one kind.
+//! The interface of non-specular BSDFs ("rough": all lobes except δ lobes), in packets of 16 surfaces of one kind.
 //!
-//! A kind is a file that implements the traits, and a line in the table of [`rough`](super::rough). No other file tells kinds
-//! apart: an integrator asks a [`BsdfRow`](super::BsdfRow) for `f`, `pdf` and `sample` of all lanes at once.
+//! A kind is a file that implements these traits, plus a line in the table of [`rough`](super::rough). No other file
+//! distinguishes kinds: an integrator calls `f`, `pdf` and `sample` of a [`BsdfRow`](super::BsdfRow) for all lanes at once.
 //!
-//! A row has the light of one side. A surface that also lets light through is two vertices, whose BSDFs are of two kinds: one is lit
-//! from the viewer's side, the other from behind, with its shading normal there. Both take the same random numbers, by which
-//! [`RoughRow::sample`] goes on at exactly one of them; the pdfs are those of one ray from both. Where light samples find nothing on
-//! one of its sides, the vertex of the other stands for both: its paths go on by [`SideSamples`].
+//! A packet receives light from one side. A surface that also transmits light is two vertices with BSDFs of different kinds: one
+//! is lit from the viewer's side, the other from behind, with its shading normal there. Both use the same random numbers, with
+//! which [`RoughRow::sample`] continues at exactly one of them; the pdfs treat both as one ray. Where light
+//! sampling finds nothing on one side, the vertex of the other side represents both, and its paths continue with [`SideSamples`].
 //!
-//! A kind may have a narrow lobe beside its wide ones, whose light has rays of its own: see [`LobeSet::Narrow`].
+//! A kind may have a narrow lobe in addition to its wide ones, which is sampled with separate rays: see [`LobeSet::Narrow`].
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
@@ -18,20 +18,20 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16};
 
-/// Texture coordinates, side by side.
+/// A packet of texture coordinates.
 pub type UvRow = [[f64; PACKET_SIZE]; 2];
 
-/// Lobes that a view shows.
+/// The lobes included in a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShownLobes {
-    /// Lobes by their role.
+    /// Lobes selected by role.
     Of {
         /// The wide lobes.
         diffuse: bool,
         /// The narrow lobe.
         specular: bool,
     },
-    /// Not the surface's lobes, but f = 1 in sr⁻¹ for every direction.
+    /// Replaces the surface's lobes with f = 1 sr⁻¹ in every direction.
     Unit,
 }
 
@@ -40,67 +40,67 @@ impl ShownLobes {
     pub const ALL: Self = Self::Of { diffuse: true, specular: true };
 }
 
-/// Lobes from which directions are sampled.
+/// The lobes from which directions are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LobeSet {
-    /// All lobes, whatever lobes are shown.
+    /// All lobes, regardless of which are shown.
     All,
-    /// The narrow lobe alone.
+    /// Only the narrow lobe.
     Narrow,
 }
 
-/// The BSDFs of a row for one direction each.
+/// BSDF values of a packet, for one direction per lane.
 #[derive(Clone, Debug)]
 pub struct BsdfValues {
     /// f in sr⁻¹ of the shown lobes.
     pub f: Vec3x16,
-    /// Two numbers for each surface that f, pdf and the parts of f share; each kind has its own.
+    /// Two numbers per surface shared by f, pdf and the parts of f; their meaning depends on the kind.
     pub(super) shared: [F32x16; 2],
 }
 
-/// Directions in which paths go on, on either side of surfaces.
+/// Sampled directions in which paths continue, on either side of the surfaces.
 #[derive(Clone, Debug)]
 pub struct SideSamples {
     /// Unit directions.
     pub directions: Vec3x16,
-    /// Their pdfs in sr⁻¹; 0 if nothing arrives from there.
+    /// Their pdfs in sr⁻¹; 0 if no light arrives from there.
     pub densities: F32x16,
-    /// f·cosθ of the lobe over the pdf.
+    /// f·cosθ of the lobe divided by the pdf.
     pub shares: F32x16,
-    /// Factors on `shares` for what is shown.
+    /// Factors on `shares` for the shown lobes.
     pub shown: F32x16,
-    /// Directions on the other side than the row's own light.
+    /// Mask of directions on the side opposite to the packet's light.
     pub beyond: Mask,
 }
 
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Unit shading normal on the side of the light: the viewer's, but for light that comes through the surface. It is
-    /// [`turned`](RoughRow::turned).
+    /// Unit shading normal on the side of the light, adjusted by [`turned`](RoughRow::turned). This is the viewer's side, except
+    /// for transmitted light.
     pub normal: Vec3,
     /// Unit direction to the viewer.
     pub to_eye: Vec3,
-    /// Derivative of the position by u; zero without texture coordinates.
+    /// ∂p/∂u; zero without texture coordinates.
     pub tangent: Vec3,
 }
 
-/// Shape of a narrow lobe, as far as the choice of lights needs it: a power of the cosine about an axis.
+/// Shape of a narrow lobe for light selection: a power of the cosine around an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NarrowLobe {
     /// Unit direction of the axis.
     pub axis: Vec3,
     /// Exponent of the cosine.
     pub exponent: f32,
-    /// f in sr⁻¹ at the peak, grey.
+    /// f in sr⁻¹ at the peak, reduced to one channel.
     pub peak: f32,
-    /// f in sr⁻¹ of the wide lobes, grey.
+    /// f in sr⁻¹ of the wide lobes, reduced to one channel.
     pub wide: f32,
 }
 
 impl NarrowLobe {
-    /// The lobe of microfacets with this α and this reflectance, beside wide lobes. About the mirrored direction, a power of 1/2α² has
-    /// the curvature of its peak.
+    /// A microfacet lobe with this α and reflectance, in addition to wide lobes. Around the mirror direction, an exponent of
+    /// 1/2α² matches the curvature of its peak.
     #[inline(always)]
     pub(super) fn of_microfacets(
         normal: Vec3,
@@ -119,21 +119,21 @@ impl NarrowLobe {
     }
 }
 
-/// A rough material: its textures and numbers.
+/// A non-specular material: its textures and parameters.
 pub trait RoughMaterial {
     /// The material at one point.
     type Point: RoughPoint;
 
-    /// Looks its textures up.
+    /// Looks up its textures.
     fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Self::Point;
 
-    /// The material with white in place of its textures.
-    fn bleached(&self) -> Self::Point;
+    /// The material with white textures.
+    fn with_white_textures(&self) -> Self::Point;
 
-    /// Its constant value. `None` if it has textures.
+    /// The material, if it has no textures.
     fn constant(&self) -> Option<Self::Point>;
 
-    /// Its main colour.
+    /// Its main color. Adds to `lookups`.
     fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
 
     /// Reflectance of ambient light.
@@ -142,10 +142,10 @@ pub trait RoughMaterial {
     /// Its textures.
     fn textures(&self) -> impl Iterator<Item = &Arc<Texture>>;
 
-    /// Whether rows are filled with it, at most by a look-up of [`RoughMaterial::row_texture`].
+    /// Whether packets can be filled with it, with at most a lookup of [`RoughMaterial::row_texture`].
     fn fills_rows(&self) -> bool;
 
-    /// The texture that rows look up. `None` if they look up nothing.
+    /// The texture that packets look up. `None` if they look up nothing.
     fn row_texture(&self) -> Option<&Texture>;
 
     /// Whether it depends on [`Place::tangent`].
@@ -155,7 +155,7 @@ pub trait RoughMaterial {
     }
 }
 
-/// A rough material at one point.
+/// A non-specular material at one point.
 pub trait RoughPoint {
     /// Whether it reflects nothing.
     fn is_black(&self) -> bool;
@@ -163,54 +163,54 @@ pub trait RoughPoint {
     /// Reflectance of ambient light.
     fn ambient(&self) -> Vec3;
 
-    /// The material with its colour multiplied by another one.
+    /// The material with its color multiplied by `color`.
     fn tinted(self, color: Vec3) -> Self;
 }
 
-/// Rough surfaces of one kind, side by side. All functions run inside of loops for each instruction set.
+/// A packet of non-specular surfaces of one kind. All functions must be called inside a SIMD kernel.
 pub trait RoughRow: Clone {
     /// The material at one point.
     type Point: RoughPoint;
 
-    /// Whether a ray in its narrow lobe goes on where other paths end, to find what the lobe mirrors.
+    /// Whether a ray in its narrow lobe continues where other paths end, to find what the lobe reflects.
     const SENDS_RAYS: bool;
 
-    /// Whether its functions are compiled into each place that calls them. Other kinds have one copy for each instruction set: a call
-    /// costs them little, and copies make a large program.
+    /// Whether its functions are inlined into every caller. Other kinds have one copy per instruction set: calls cost them
+    /// little, and more copies would bloat the program.
     const IS_COPIED: bool = false;
 
-    /// A row of any content.
+    /// A packet with arbitrary contents.
     const EMPTY: Self;
 
-    /// The shading normal by which its lobes are lit, given one on the side of the light, and the direction to the viewer. Lobes of
-    /// microfacets turn it to the viewer, see [`facing`](super::microfacet::facing).
+    /// The shading normal used by its lobes, given one on the side of the light and the direction to the viewer. Microfacet lobes
+    /// rotate it to face the viewer; see [`facing`](super::microfacet::facing).
     #[inline(always)]
     fn turned(normal: Vec3, _to_eye: Vec3) -> Vec3 {
         normal
     }
 
-    /// Prepares the row for other surfaces.
+    /// Prepares the packet for other surfaces.
     fn reset(&mut self);
 
     /// Sets a surface.
     fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, place: &Place);
 
-    /// Takes a surface of another row.
+    /// Copies a surface of another packet.
     fn copy(&mut self, i: usize, other: &Self, from: usize);
 
     /// Evaluates the shown lobes for light from these directions.
     fn f(&self, directions: &Vec3x16) -> BsdfValues;
 
-    /// The parts of f: of the wide lobes, and of the narrow lobes.
+    /// The parts of f from the wide and from the narrow lobes.
     fn parts(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2];
 
-    /// f in sr⁻¹ of all lobes, whatever lobes are shown, by the largest components of their colours.
-    fn grey(&self, values: &BsdfValues) -> F32x16;
+    /// f in sr⁻¹ of all lobes, regardless of which are shown, from the largest color components.
+    fn max_component(&self, values: &BsdfValues) -> F32x16;
 
-    /// Pdfs in sr⁻¹ of directions among the samples of lobes, with these normals for the cosine.
+    /// Pdfs in sr⁻¹ of directions sampled from these lobes; `normals` are used for cosine lobes.
     fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16;
 
-    /// Samples a unit direction for each surface; `choices` choose the lobes and `u` the directions in them, all in [0, 1).
+    /// Samples a unit direction for each surface; `choices` selects the lobes and `u` the directions within them, all in [0, 1).
     fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16;
 
     /// Whether any surface may have a narrow lobe; without one, [`RoughRow::sample`] ignores the choices.
@@ -219,7 +219,7 @@ pub trait RoughRow: Clone {
     /// Whether a surface has a narrow lobe, shown or not.
     fn has_narrow_lobe(&self, i: usize) -> bool;
 
-    /// A bit for each surface that has a narrow lobe, shown or not.
+    /// Mask of surfaces that have a narrow lobe, shown or not.
     #[inline(always)]
     fn narrow_lobes(&self) -> u32 {
         let mut narrow = 0;
@@ -232,23 +232,23 @@ pub trait RoughRow: Clone {
     /// The narrow lobe of a surface. `None` if it has none.
     fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe>;
 
-    /// A bit for each surface with a narrow lobe that is at least as narrow as a cosine to this power.
+    /// Mask of the surfaces in `of` whose narrow lobe is at least as narrow as a cosine to this power.
     fn narrower_than(&self, of: u32, exponent: f32) -> u32;
 
-    /// f in sr⁻¹ of the shown lobes of a surface, if it is the same for all directions.
-    fn even(&self, i: usize) -> Option<Vec3>;
+    /// f in sr⁻¹ of the shown lobes of a surface, if it is constant over all directions.
+    fn constant_f(&self, i: usize) -> Option<Vec3>;
 
     /// f in sr⁻¹ of the shown lobes of a surface for light from a direction.
     fn f_at(&self, i: usize, direction: Vec3) -> Vec3;
 }
 
-/// Rows of surfaces that have this BSDF for all of their light, whatever is around them.
+/// Packets of surfaces that have this BSDF for all of their light, regardless of their surroundings.
 pub trait MaterialRow: RoughRow {
     /// The material.
     type Material: RoughMaterial<Point = Self::Point>;
 
-    /// Sets the surfaces of some lanes to a material, looked up at these texture coordinates, or bleached without them. Each entry
-    /// of `shown` replaces those before it. Returns a bit for each surface that reflects nothing.
+    /// Sets the surfaces of some lanes to a material, with textures looked up at `uv`, or white without `uv`. Later entries of
+    /// `shown` override earlier ones. Returns a mask of surfaces that reflect nothing.
     fn fill(
         &mut self,
         material: &Self::Material,
@@ -257,7 +257,7 @@ pub trait MaterialRow: RoughRow {
         simd: impl Simd,
     ) -> u32;
 
-    /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given. All normals
-    /// are replaced by those of [`RoughRow::turned`].
+    /// Sets shading normals on the viewer's side and incoming ray directions, for the lanes in `of` or for all. Replaces all
+    /// normals by those of [`RoughRow::turned`].
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16);
 }

@@ -1,4 +1,4 @@
-//! A smooth coat over a rough base: a δ lobe, and the lobes of the base for the rest of the light.
+//! A smooth coat over a non-specular base: a δ lobe, plus the base's lobes for the remaining light.
 
 use std::sync::Arc;
 
@@ -8,25 +8,25 @@ use super::rough::Rough;
 use super::texture::{Color, Texture};
 use crate::math::Vec3;
 
-/// A smooth dielectric coat over a rough base, which knows what the coat lets through.
+/// A smooth dielectric coat over a base, whose lobes already account for the coat's transmittance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coated {
-    /// Factor on what the coat reflects.
+    /// Factor on the coat's reflection.
     pub specular: Color,
     /// Index of refraction of the coat, ≥ 1.
     pub ior: f32,
-    /// Surface under it.
+    /// The surface under the coat.
     pub base: Rough,
 }
 
 impl Coated {
-    /// The part of the light that the coat reflects, by the cosine of the angle of incidence, but for `specular`.
+    /// Fresnel reflectance of the coat at a cosine of the angle of incidence, without the factor `specular`.
     #[inline]
     pub fn fresnel(&self, cosine: f32) -> f32 {
         dielectric(cosine, self.ior).0
     }
 
-    /// The factor on what the coat reflects.
+    /// The factor on the coat's reflection. Adds to `lookups`.
     #[inline]
     pub fn specular(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.specular.at(at, lookups)

@@ -9,25 +9,25 @@ use crate::choice;
 use crate::math::Vec3;
 
 choice! {
-    /// Sides of a surface that emit.
+    /// Which sides of a surface emit.
     pub enum EmissionSides {
-        /// The front.
+        /// Only the front.
         Front = "front",
-        /// The front and the back alike.
+        /// Both the front and the back.
         Both = "both",
     }
 }
 
-/// Radiance of a surface.
+/// Emitted radiance of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
     /// Radiance; with a texture, the factor on it.
     pub scale: Vec3,
-    /// Texture by which it is multiplied from point to point.
+    /// Texture that modulates the radiance.
     pub texture: Option<Arc<Texture>>,
-    /// Sides that emit.
+    /// Which sides emit.
     pub sides: EmissionSides,
-    /// Clear coat that weakens the radiance by its direction. `None` if there is none.
+    /// Clear coat that attenuates the radiance depending on direction. `None` without one.
     pub coat: Option<Arc<EmissionCoat>>,
 }
 
@@ -35,13 +35,13 @@ impl Emission {
     /// No emission.
     pub const NONE: Self = Self::constant(Vec3::ZERO);
 
-    /// The same emission everywhere on the front.
+    /// Constant emission from the front.
     pub const fn constant(scale: Vec3) -> Self {
         Self { scale, texture: None, sides: EmissionSides::Front, coat: None }
     }
 
-    /// Whether it may be above 0 somewhere.
-    pub fn shines(&self) -> bool {
+    /// Whether anything may be emitted.
+    pub fn is_emissive(&self) -> bool {
         self.scale != Vec3::ZERO
     }
 
@@ -56,15 +56,17 @@ impl Emission {
 
     /// Whether a side may emit.
     #[inline]
-    pub fn shines_from(&self, is_front: bool) -> bool {
-        self.shines() && (is_front || self.is_two_sided())
+    pub fn emits_from(&self, is_front: bool) -> bool {
+        self.is_emissive() && (is_front || self.is_two_sided())
     }
 
-    /// The radiance at texture coordinates, by the cosine of its direction; adds to `lookups`.
+    /// The radiance at texture coordinates, for the cosine of its direction. Adds to `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
         let left = self.coat.as_ref().map_or(1.0, |coat| coat.left(at, cosine, lookups));
-        let Some(texture) = self.texture.as_ref().filter(|_| self.shines()) else { return self.scale * left };
+        let Some(texture) = self.texture.as_ref().filter(|_| self.is_emissive()) else {
+            return self.scale * left;
+        };
         *lookups += 1;
         self.scale * texture.lookup(at) * left
     }

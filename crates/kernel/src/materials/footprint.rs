@@ -1,54 +1,55 @@
-//! Footprints: the part of a texture that one look-up covers.
+//! Footprints: the area of a texture that one lookup covers.
 
 use crate::math::{DVec2, Vec2, Vec3};
 
-/// A set of texture coordinates of a mesh.
+/// One of a mesh's UV sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum UvSet {
-    /// The first, which shapes have as well.
+    /// The first set, which shapes also have.
     #[default]
     First,
-    /// The second, or the first if the mesh has one alone.
+    /// The second set, or the first if the mesh has only one.
     Second,
 }
 
-/// A place in a texture, with the footprint of the look-up.
+/// A point in texture space, with the lookup's footprint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturePoint {
     /// Texture coordinates.
     pub uv: DVec2,
-    /// Footprint around them; filters without mip levels ignore it.
+    /// Footprint around `uv`; ignored by filters without mip levels.
     pub footprint: Footprint,
-    /// The place by the second set of coordinates. `None` if the object has none, or no texture asks for it. In a box, so that
-    /// points without it stay small.
-    pub second: Option<Box<SecondPoint>>,
+    /// The point in the second UV set. `None` if the object has none or no texture uses it. Boxed to keep points without it
+    /// small.
+    pub second: Option<Box<SecondUvPoint>>,
 }
 
-/// A place by the second set of texture coordinates.
+/// A point in the second UV set.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SecondPoint {
+pub struct SecondUvPoint {
     /// Texture coordinates.
     pub uv: DVec2,
-    /// Footprint around them.
+    /// Footprint around `uv`.
     pub footprint: Footprint,
-    /// Changes of the point with u and v.
+    /// ∂p/∂u and ∂p/∂v.
     pub tangents: [Vec3; 2],
 }
 
 impl TexturePoint {
-    /// A point without extent.
+    /// A point without a footprint.
     pub fn sharp(uv: DVec2) -> Self {
         Self { uv, footprint: Footprint::POINT, second: None }
     }
 
-    /// The same point without extent.
+    /// The same point without its footprint.
     pub fn without_extent(&self) -> Self {
-        let sharp = |second: &SecondPoint| Box::new(SecondPoint { footprint: Footprint::POINT, ..*second });
+        let sharp =
+            |second: &SecondUvPoint| Box::new(SecondUvPoint { footprint: Footprint::POINT, ..*second });
         Self { uv: self.uv, footprint: Footprint::POINT, second: self.second.as_deref().map(sharp) }
     }
 }
 
-/// An ellipse of texture coordinates, by its axes; both are 0 for a point.
+/// An ellipse in texture space, given by its axes; both are 0 for a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     axes: [Vec2; 2],
@@ -59,9 +60,9 @@ impl Footprint {
     pub const POINT: Self = Self { axes: [Vec2::ZERO; 2] };
 
     /// Footprint of a ray cone with this width at a surface, around a unit direction (Akenine-Möller, Crassin, Boksansky,
-    /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5): `width`
-    /// across the direction, and longer by the inverse cosine along it. `tangents` are the changes of the point with u and v; if
-    /// they are parallel or 0, the footprint is a point.
+    /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5). The
+    /// ellipse has `width` perpendicular to the direction and is longer along it by the inverse cosine. `tangents` are ∂p/∂u and
+    /// ∂p/∂v; if they are parallel or 0, the footprint is a point.
     #[inline]
     pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);
@@ -75,20 +76,20 @@ impl Footprint {
             let (by_u, by_v) = (vector.dot(u), vector.dot(v));
             Vec2::new(vv * by_u - uv * by_v, uu * by_v - uv * by_u) / determinant
         };
-        let long = width / cosine.abs().max(Self::LEAST_COSINE);
+        let long = width / cosine.abs().max(Self::MIN_COSINE);
         let axes = [coordinates(along * long), coordinates(across * width)];
         if axes.iter().all(|axis| axis.is_finite()) { Self { axes } } else { Self::POINT }
     }
 
-    /// Least cosine: at smaller ones, footprints no longer grow.
-    const LEAST_COSINE: f32 = 1e-4;
+    /// Minimum cosine: below it, footprints stop growing.
+    const MIN_COSINE: f32 = 1e-4;
 
-    /// The longer axis in texels, for so many texels in a unit of u and of v.
+    /// Length of the longer axis in texels, given the texels per unit of u and v.
     pub fn texels(&self, per_unit: Vec2) -> f32 {
         self.longest(|axis| axis * per_unit)
     }
 
-    /// The longer axis after a linear map.
+    /// Length of the longer axis after a linear map.
     #[inline]
     pub fn longest(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
         let lengths = self.axes.map(|axis| map(axis).length());
@@ -101,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cone_covers_more_along_its_direction() {
+    fn footprints_stretch_along_the_direction() {
         let tangents = [Vec3::X * 2.0, Vec3::Y * 4.0];
         let straight = Footprint::of_cone(0.5, Vec3::NEG_Z, Vec3::Z, tangents);
         // 0.5 units are a quarter of u and an eighth of v.
@@ -113,16 +114,16 @@ mod tests {
     }
 
     #[test]
-    fn oblique_tangents_are_told_apart() {
+    fn oblique_tangents_are_separated() {
         let tangents = [Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
         let seen = Footprint::of_cone(1.0, Vec3::new(0.6, 0.0, -0.8), Vec3::Z, tangents);
-        // Along x, 1/0.8 of u alone; along y, one v and one u back.
+        // Along x: only 1/0.8 of u. Along y: one v, minus one u.
         assert!((seen.texels(Vec2::X) - 1.25).abs() < 1e-6);
         assert!((seen.texels(Vec2::Y) - 1.0).abs() < 1e-6);
     }
 
     #[test]
-    fn where_there_are_no_tangents_it_is_a_point() {
+    fn degenerate_tangents_give_a_point() {
         for tangents in [[Vec3::ZERO; 2], [Vec3::X, Vec3::X * 2.0], [Vec3::NAN, Vec3::X]] {
             assert_eq!(Footprint::of_cone(1.0, Vec3::NEG_Z, Vec3::Z, tangents), Footprint::POINT);
         }

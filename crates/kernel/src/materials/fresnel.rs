@@ -1,14 +1,14 @@
-//! Reflection and refraction at a smooth boundary of dielectrics.
+//! Fresnel reflection and refraction at smooth boundaries.
 
 use crate::math::Vec3;
 
-/// Unpolarised reflectance, and the cosine of the transmitted direction. `None` for total internal reflection.
-/// `cos_incident` ≥ 0 on the side of the ray, `eta` = n(far side)/n(ray's side). Exact equations of both polarisations
-/// (Born and Wolf, *Principles of Optics*, section 1.5.2).
+/// Unpolarized reflectance of a dielectric boundary, and the cosine of the transmitted direction, which is `None` for total
+/// internal reflection. `cos_incident` ≥ 0 is measured on the ray's side; `eta` = n(far side)/n(ray's side). Uses the exact
+/// equations for both polarizations (Born and Wolf, *Principles of Optics*, section 1.5.2).
 #[inline]
 pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
-    // Compute 1 − sin²θₜ without the cancellation at grazing angles.
+    // Compute 1 − sin²θₜ without cancellation at grazing angles.
     let cos2_t = ((eta - 1.0) * (eta + 1.0) + cos_i * cos_i) / (eta * eta);
     if !(cos2_t > 0.0) {
         return (1.0, None);
@@ -19,32 +19,32 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
-/// [`dielectric`] from outside in `f32`, for rows: `eta` ≥ 1.
+/// [`dielectric`] from outside (`eta` ≥ 1) in `f32`, for packets.
 #[inline(always)]
 pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
     by_root(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
 }
 
-/// [`dielectric`] from either side in `f32`, for rows; 1 for total internal reflection.
+/// [`dielectric`] from either side in `f32`, for packets; 1 for total internal reflection.
 #[inline(always)]
 pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
     let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
     by_root(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
 }
 
-/// The reflectance, given the squared cosine of the transmitted direction times η².
+/// The reflectance, given η² times the squared cosine of the transmitted direction.
 #[inline(always)]
 fn by_root(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
     let cos_t = cos2_t.sqrt();
     let squared = eta * eta;
-    // Both cosines are multiplied by η. At grazing angles without a boundary nothing is divided by 0.
+    // Both cosines are multiplied by η. The `max` avoids 0/0 at grazing angles for η = 1.
     let parallel = (squared * cos_incident - cos_t) / (squared * cos_incident + cos_t).max(f32::MIN_POSITIVE);
     let perpendicular = (cos_incident - cos_t) / (cos_incident + cos_t).max(f32::MIN_POSITIVE);
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// The part that a boundary lets through, of unpolarised light, by both cosines to its normal and both indices of refraction: the same
-/// to the bit from either side, and without cancellation.
+/// Transmittance of a boundary for unpolarized light, from both cosines with its normal and both indices of refraction. It is
+/// bit-identical from either side, and computed without cancellation.
 #[inline(always)]
 pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
     let (parallel, perpendicular) = (n_2 * cos_1 + n_1 * cos_2, n_1 * cos_1 + n_2 * cos_2);
@@ -52,12 +52,13 @@ pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
     2.0 * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse
 }
 
-/// Unpolarised reflectance of a conductor of index η and extinction k (Born and Wolf, *Principles of Optics*, section 14.2).
+/// Unpolarized reflectance of a conductor with index η and extinction k (Born and Wolf, *Principles of Optics*, section 14.2).
 #[inline(always)]
 pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let cos2 = cos_incident * cos_incident;
     let sin2 = (1.0 - cos2).max(0.0);
-    // a + ib is the root of (η + ik)² − sin²θ; of a² and b² the larger one first, as the smaller one cancels.
+    // a + ib is the square root of (η + ik)² − sin²θ. Of a² and b², compute the larger one first, because the smaller one suffers
+    // from cancellation.
     let real = (eta - k) * (eta + k) - sin2;
     let product = eta * k;
     let sum = (real * real + 4.0 * product * product).sqrt();
@@ -65,18 +66,18 @@ pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let smaller = product * product / larger.max(f32::MIN_POSITIVE);
     let a = if real > 0.0 { larger } else { smaller }.sqrt();
     let (even, odd) = (sum + cos2, 2.0 * a * cos_incident);
-    // Rounding must not make it negative where nothing is reflected, at an index of 1.
+    // For an index of 1 the reflectance is 0; keep rounding from making it negative.
     let rest = if even > odd { even - odd } else { 0.0 };
     let perpendicular = rest / (even + odd).max(f32::MIN_POSITIVE);
     let (even, odd) = (cos2 * sum + sin2 * sin2, odd * sin2);
-    // An index of 0 reflects all, at normal incidence too.
+    // An index of 0 reflects all light, even at normal incidence.
     let ratio = if even > 0.0 { (even - odd) / (even + odd) } else { 1.0 };
     let parallel = perpendicular * ratio;
     0.5 * (perpendicular + parallel)
 }
 
-/// Weight of the reflectance at grazing angles against that at normal incidence, (1 − cosθ)⁵ (Schlick, *An Inexpensive BRDF Model for
-/// Physically-based Rendering*, 1994).
+/// Schlick's weight (1 − cosθ)⁵ of the grazing reflectance relative to the one at normal incidence (Schlick, *An Inexpensive BRDF
+/// Model for Physically-based Rendering*, 1994).
 #[inline(always)]
 pub fn schlick_weight(cos_incident: f32) -> f32 {
     let rest = (1.0 - cos_incident).max(0.0);
@@ -84,8 +85,8 @@ pub fn schlick_weight(cos_incident: f32) -> f32 {
     squared * squared * rest
 }
 
-/// The refracted direction of unit `incident`, given the unit normal on its own side and the result of [`dielectric`]
-/// (Snell).
+/// The refracted direction (Snell's law) of unit `incident`, given the unit normal on its side and the cosine from
+/// [`dielectric`].
 pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
     let cos_incident = -incident.dot(normal);
     (incident / eta + normal * (cos_incident / eta - cos_transmitted)).normalize()
@@ -96,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_reflect_as_single_rays_do() {
+    fn single_precision_matches_the_exact_equations() {
         for eta in [1.0_f32, 1.01, 1.5, 2.5, 10.0] {
             for step in 0..=1000_u16 {
                 let cosine = f32::from(step) / 1000.0;
@@ -124,14 +125,14 @@ mod tests {
         }
     }
 
-    /// The reflectance of a conductor by complex numbers.
+    /// The reflectance of a conductor, computed with complex numbers.
     fn conductor_of_complex_numbers(cos: f64, eta: f64, k: f64) -> f64 {
         type Complex = [f64; 2];
         let times = |[a, b]: Complex, [c, d]: Complex| [a * c - b * d, a * d + b * c];
         let over = |z: Complex, [c, d]: Complex| times(z, [c / (c * c + d * d), -d / (c * c + d * d)]);
         let index = [eta, k];
         let [re, im] = times(index, index);
-        // The cosine of the transmitted direction times the index: √(n² − sin²θ).
+        // η times the cosine of the transmitted direction: √(n² − sin²θ).
         let (re, im) = (re - (1.0 - cos * cos), im);
         let size = (re * re + im * im).sqrt();
         let root = [((size + re) * 0.5).sqrt(), ((size - re) * 0.5).sqrt()];
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn conductors_reflect_as_complex_indices_say() {
+    fn conductors_match_complex_arithmetic() {
         for (eta, k) in [(0.05_f32, 4.3_f32), (0.2, 3.9), (1.5, 7.6), (2.9, 3.1), (1.5, 0.0), (0.5, 0.1)] {
             for step in 1..=100_u16 {
                 let cosine = f32::from(step) / 100.0;
@@ -152,7 +153,7 @@ mod tests {
                 assert!((exact - found).abs() < 2e-5, "{eta} + {k}i at {cosine}: {found} is not {exact}");
             }
         }
-        // Nothing is reflected where both sides have one index; rounding makes no less of it.
+        // With equal indices nothing is reflected: rounding must not give a negative reflectance.
         for eta in [1.0_f32, 1.0 - f32::EPSILON, 1.0 + f32::EPSILON, 1.001] {
             for step in 0..=1000_u16 {
                 let found = conductor(f32::from(step) / 1000.0, eta, 0.0);
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn normal_incidence_and_grazing() {
+    fn reflectance_at_known_angles() {
         assert!((reflectance(0.0, 1.5) - 0.04).abs() < 1e-7);
         assert!((reflectance(90.0, 1.5) - 1.0).abs() < 1e-5);
         // Brewster's angle: half of the perpendicular reflectance.
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn all_is_reflected_beyond_the_critical_angle() {
+    fn total_reflection_beyond_the_critical_angle() {
         for (n, critical) in [(1.5, 41.8103), (1.33, 48.7535), (2.4, 24.6244)] {
             let transmitted = |degrees: f64| dielectric(degrees.to_radians().cos() as f32, 1.0 / n).1;
             assert!(transmitted(critical - 0.01).is_some(), "{n}");
@@ -188,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_over_the_hemisphere_from_outside_and_inside() {
+    fn hemispherical_mean_from_both_sides() {
         let mean = |eta: f32| {
             let n = 1_000_000;
             let cos2 = |i: i32| (f64::from(i) + 0.5) / f64::from(n);

@@ -1,58 +1,60 @@
-//! Directional albedos of lobes of microfacets: E(μ) = ∫ f(μ, ω) cosθ dω, by the cosine μ of the viewer.
+//! Directional albedos of microfacet lobes: E(μ) = ∫ f(μ, ω) cosθ dω, as functions of the cosine μ of the view direction.
 //!
-//! They are made by quadrature over visible normals (Heitz, *Sampling the GGX Distribution of Visible Normals*, JCGT 7(4), 2018),
-//! and kept as polynomials of t = (1 + c)μ/(μ + c), which spreads grazing angles. From μ = .05 on they are not below the albedo, and
-//! at most 8e-4 above it, in tables by a roughness that changes 2e-3: what a base under the lobe gets is never too much.
+//! They are computed by quadrature over visible normals (Heitz, *Sampling the GGX Distribution of Visible Normals*, JCGT 7(4),
+//! 2018) and stored as polynomials in t = (1 + c)μ/(μ + c), which expands grazing angles. For μ ≥ 0.05, the polynomials are never
+//! below the albedo and at most 8e-4 above it; interpolation in tables over a varying roughness adds at most 2e-3. The base under
+//! a lobe therefore never receives too much light.
 
 use std::f64::consts::TAU;
 
 use crate::math::{DVec3, Vec3};
 
-/// Number of terms of a polynomial.
+/// Number of polynomial terms.
 pub const TERMS: usize = 10;
 
-/// c of t, see above.
+/// The constant c in t.
 const KNEE: f64 = 0.15;
 
-/// Values of roughness of a table.
-const ROWS: usize = 80;
+/// Number of roughness values in a table.
+const TABLE_SIZE: usize = 80;
 
-/// The albedo of one lobe.
+/// The directional albedo of one lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeAlbedo {
-    /// Factors of the powers of 2t − 1.
+    /// Coefficients of the powers of 2t − 1.
     pub terms: [f32; TERMS],
-    /// Its mean over all directions, 2 ∫ E(μ) μ dμ.
+    /// Its cosine-weighted mean over all directions, 2 ∫ E(μ) μ dμ.
     pub mean: f32,
 }
 
 impl LobeAlbedo {
-    /// The albedo by μ ≥ 0.
+    /// The albedo at μ ≥ 0.
     #[inline]
     pub fn at(&self, cosine: f32) -> f32 {
         evaluate(cosine, |number| self.terms[number])
     }
 
-    /// Makes it for a lobe of isotropic α with this reflectance of facets by the cosine.
+    /// Computes the albedo of a lobe with isotropic α and a facet reflectance that depends on the cosine.
     pub fn of(alpha: f64, reflectance: impl Fn(f64) -> f64) -> Self {
         Self::fitted(|cosine| quadrature::<12, 16>(cosine, alpha, &reflectance))
     }
 
-    /// Makes it for an albedo that is known, with the exact mean of that.
+    /// Fits a known albedo, and stores its exact mean.
     pub fn known(albedo: impl Fn(f64) -> f64) -> Self {
         Self { mean: mean(&albedo) as f32, ..Self::fitted(albedo) }
     }
 
-    /// Fits a polynomial. The mean is that of the polynomial: what a lobe leaves to a base by this albedo adds up with it.
+    /// Fits a polynomial. The stored mean is the polynomial's, so that the light left for a base by this albedo is
+    /// consistent with it.
     fn fitted(albedo: impl Fn(f64) -> f64) -> Self {
         const NODES: usize = 32;
-        // Evaluate the albedo, more densely at grazing angles; those below .03 count less.
+        // Evaluate the albedo at nodes that are denser at grazing angles. Nodes below μ = 0.03 have less weight.
         let nodes: [(f64, f64); NODES] = std::array::from_fn(|i| {
             let t = 0.5 - 0.5 * libm::cos(std::f64::consts::PI * (i as f64 + 0.5) / NODES as f64);
             let cosine = (t * t.sqrt()).max(0.004);
             (cosine, albedo(cosine))
         });
-        // Fit the terms of Chebyshev; weights that grow with the errors even these out (Lawson's algorithm).
+        // Fit a Chebyshev series. Weights that grow with the errors equalize them (Lawson's algorithm).
         let least = |cosine: f64| if cosine < 0.03 { 0.1 } else { 1.0 };
         let mut weights = nodes.map(|(cosine, _)| least(cosine));
         let mut terms = [0.0; TERMS];
@@ -64,7 +66,7 @@ impl LobeAlbedo {
                 *weight *= (0.3 + error / largest).sqrt();
             }
         }
-        // Rise above the albedo.
+        // Raise the polynomial above the albedo.
         let missing = nodes
             .iter()
             .filter(|(cosine, _)| *cosine > 0.03)
@@ -74,8 +76,8 @@ impl LobeAlbedo {
         Self { mean: mean(|cosine| fit.at(cosine as f32).into()) as f32, ..fit }
     }
 
-    /// A part of the way to another.
-    fn mixed(&self, other: &Self, part: f32) -> Self {
+    /// Interpolates linearly between two albedos.
+    fn lerp(&self, other: &Self, part: f32) -> Self {
         let mix = |one: f32, other: f32| one + (other - one) * part;
         Self {
             terms: std::array::from_fn(|i| mix(self.terms[i], other.terms[i])),
@@ -84,25 +86,25 @@ impl LobeAlbedo {
     }
 }
 
-/// Albedos by roughness.
+/// Albedos as a function of roughness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AlbedoTable {
-    /// In equal steps of the roughness from 0 to 1; or a single one.
+    /// Albedos at equidistant roughness values from 0 to 1, or a single one.
     rows: Vec<LobeAlbedo>,
 }
 
 impl AlbedoTable {
-    /// The table of lobes with α = `alpha(roughness)`; of a single value if the roughness is the same everywhere.
+    /// A table for lobes with α = `alpha(roughness)`; it has a single entry if the roughness is constant.
     pub fn new(roughness: Option<f32>, alpha: impl Fn(f32) -> f32, reflectance: impl Fn(f64) -> f64) -> Self {
         let row = |roughness: f32| LobeAlbedo::of(alpha(roughness).into(), &reflectance);
         let rows = match roughness {
             Some(one) => vec![row(one)],
-            None => (0..ROWS).map(|i| row(i as f32 / (ROWS - 1) as f32)).collect(),
+            None => (0..TABLE_SIZE).map(|i| row(i as f32 / (TABLE_SIZE - 1) as f32)).collect(),
         };
         Self { rows }
     }
 
-    /// The table of one lobe.
+    /// A table with a single entry.
     pub fn single(albedo: LobeAlbedo) -> Self {
         Self { rows: vec![albedo] }
     }
@@ -112,11 +114,11 @@ impl AlbedoTable {
         let place = roughness.clamp(0.0, 1.0) * (self.rows.len() - 1) as f32;
         let number = (place as usize).min(self.rows.len().saturating_sub(2));
         let next = self.rows.get(number + 1).unwrap_or(&self.rows[number]);
-        self.rows[number].mixed(next, place - number as f32)
+        self.rows[number].lerp(next, place - number as f32)
     }
 }
 
-/// The albedo by μ ≥ 0, given the terms by number.
+/// The albedo at μ ≥ 0, given a function that returns the terms.
 #[inline(always)]
 pub fn evaluate(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     let t = (1.0 + KNEE as f32) * cosine / (cosine + KNEE as f32);
@@ -129,12 +131,12 @@ pub fn evaluate(cosine: f32, term: impl Fn(usize) -> f32) -> f32 {
     if sum < 1.0 { sum } else { 1.0 }
 }
 
-/// Mean over directions, 2 ∫ E(μ) μ dμ.
+/// Cosine-weighted mean over directions, 2 ∫ E(μ) μ dμ.
 fn mean(albedo: impl Fn(f64) -> f64) -> f64 {
     gauss(32).map(|(cosine, weight)| 2.0 * cosine * weight * albedo(cosine)).sum()
 }
 
-/// The polynomials of Chebyshev at μ.
+/// Chebyshev polynomials at μ.
 fn chebyshev(cosine: f64) -> [f64; TERMS] {
     let x = 2.0 * (1.0 + KNEE) * cosine / (cosine + KNEE) - 1.0;
     let mut values = [1.0; TERMS];
@@ -149,7 +151,7 @@ fn sum(terms: &[f64; TERMS], cosine: f64) -> f64 {
     chebyshev(cosine).iter().zip(terms).map(|(value, term)| value * term).sum()
 }
 
-/// Terms of least squared error, by the normal equations and Gaussian elimination; the matrix is positive definite.
+/// Least-squares coefficients, from the normal equations with Gaussian elimination; the matrix is positive definite.
 fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
     let mut rows = [[0.0; TERMS + 1]; TERMS];
     for (&(cosine, value), weight) in nodes.iter().zip(weights) {
@@ -178,7 +180,7 @@ fn least_squares(nodes: &[(f64, f64)], weights: &[f64]) -> [f64; TERMS] {
     terms
 }
 
-/// From factors of the polynomials of Chebyshev to factors of powers.
+/// Converts Chebyshev coefficients to power-basis coefficients.
 fn powers(terms: &[f64; TERMS]) -> [f64; TERMS] {
     let (mut before, mut own) = ([0.0; TERMS], [0.0; TERMS]);
     (before[0], own[1]) = (1.0, 1.0);
@@ -187,7 +189,7 @@ fn powers(terms: &[f64; TERMS]) -> [f64; TERMS] {
         for i in 0..TERMS {
             sums[i] += term * before[i];
         }
-        // Go on by Tₙ₊₁ = 2x·Tₙ − Tₙ₋₁.
+        // Use the recurrence Tₙ₊₁ = 2x·Tₙ − Tₙ₋₁.
         let mut next = before.map(|factor| -factor);
         for i in 1..TERMS {
             next[i] += 2.0 * own[i - 1];
@@ -199,7 +201,7 @@ fn powers(terms: &[f64; TERMS]) -> [f64; TERMS] {
     sums
 }
 
-/// Places in (0, 1) and weights of Gauss and Legendre, by Newton's method.
+/// Gauss–Legendre nodes in (0, 1) and weights, computed with Newton's method.
 fn gauss(count: usize) -> impl Iterator<Item = (f64, f64)> {
     (0..count).map(move |i| {
         let mut x = libm::cos(std::f64::consts::PI * (i as f64 + 0.75) / (count as f64 + 0.5));
@@ -217,8 +219,9 @@ fn gauss(count: usize) -> impl Iterator<Item = (f64, f64)> {
     })
 }
 
-/// The facets that are visible from a direction, by a point (x, b) of the unit disk: x across the plane of incidence, b along it.
-struct Facets {
+/// The facets visible from a direction, parameterized by a point (x, b) on the unit disk: x is perpendicular to the plane of
+/// incidence, b is in it.
+struct VisibleFacets {
     alpha: f64,
     to_eye: DVec3,
     /// The stretched direction, and the axis of b.
@@ -228,7 +231,7 @@ struct Facets {
     masked: f64,
 }
 
-impl Facets {
+impl VisibleFacets {
     fn new(cosine: f64, alpha: f64) -> Self {
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
         let view = DVec3::new(alpha * sine, 0.0, cosine).normalize();
@@ -236,7 +239,7 @@ impl Facets {
         Self { alpha, to_eye, view, second, masked: lambda(cosine, alpha) }
     }
 
-    /// Cosines of a facet with the direction, and of the mirrored direction with the surface.
+    /// Cosine between a facet and the direction, and cosine of the reflected direction with the surface normal.
     fn mirrored(&self, x: f64, b: f64) -> [f64; 2] {
         let Self { alpha, to_eye, view, second, .. } = self;
         let part = 0.5 * (1.0 + view.z);
@@ -248,12 +251,12 @@ impl Facets {
         [between, 2.0 * between * half.z - to_eye.z]
     }
 
-    /// Height of the mirrored direction, at a part of the half chord from its middle.
+    /// Height of the reflected direction at a position on the chord at x, in units of half its length from its center.
     fn height(&self, x: f64, part: f64) -> f64 {
         self.mirrored(x, (1.0 - x * x).sqrt() * part)[1]
     }
 
-    /// A part of the half chord where light is mirrored away from the surface. `None` if there is none.
+    /// A position on the chord at which light is reflected above the surface. `None` if there is none.
     fn lit(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
@@ -261,9 +264,9 @@ impl Facets {
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
-    /// The ends of the lit part of the chord around `lit`, in half chords from its middle.
+    /// The ends of the part of the chord around `lit` where light is reflected above the surface, in half chords from its center.
     fn ends(&self, x: f64, lit: f64) -> [f64; 2] {
-        [-1.0, 1.0].map(|end| border(lit, end, |part| self.height(x, part) > 0.0))
+        [-1.0, 1.0].map(|end| last_true(lit, end, |part| self.height(x, part) > 0.0))
     }
 }
 
@@ -273,8 +276,8 @@ fn lambda(cosine: f64, alpha: f64) -> f64 {
     0.5 * ((1.0 + alpha * alpha * tangent2).sqrt() - 1.0)
 }
 
-/// The last place from `from` towards `to` where something holds, by bisection; it holds at `from`.
-fn border(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
+/// The last position from `from` toward `to` at which a predicate holds, found by bisection. It must hold at `from`.
+fn last_true(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(to) {
         return to;
     }
@@ -285,24 +288,24 @@ fn border(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     from
 }
 
-/// Places in (0, 1) and weights for functions that change fast at both ends.
-fn at_the_ends(count: usize) -> Vec<(f64, f64)> {
+/// Nodes in (0, 1) and weights for functions that vary quickly near both ends.
+fn dense_at_ends(count: usize) -> Vec<(f64, f64)> {
     gauss(count).map(|(t, weight)| (t * t * (3.0 - 2.0 * t), weight * 6.0 * t * (1.0 - t))).collect()
 }
 
-/// E(μ): the mean of F·G/G₁ over visible normals, by so many points across the plane of incidence, and along it. The points lie
-/// where light is mirrored away from the surface, whose border would cost digits.
+/// E(μ): the mean of F·G/G₁ over visible normals, with `ACROSS` nodes perpendicular to the plane of incidence and `ALONG` nodes
+/// in it. All nodes are where light is reflected above the surface; integrating across that border would cost accuracy.
 fn quadrature<const ACROSS: usize, const ALONG: usize>(
     cosine: f64,
     alpha: f64,
     reflectance: &impl Fn(f64) -> f64,
 ) -> f64 {
-    let facets = Facets::new(cosine, alpha);
-    // Half of the disk will do: the other half mirrors it.
-    let widest = border(0.0, 0.25 * TAU, |turn| facets.lit(libm::sin(turn)).is_some());
-    let along = at_the_ends(ALONG);
+    let facets = VisibleFacets::new(cosine, alpha);
+    // Half of the disk is enough: the integrand is symmetric.
+    let widest = last_true(0.0, 0.25 * TAU, |turn| facets.lit(libm::sin(turn)).is_some());
+    let along = dense_at_ends(ALONG);
     let mut sum = 0.0;
-    for (turn, by_turn) in at_the_ends(ACROSS) {
+    for (turn, by_turn) in dense_at_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
         let Some(lit) = facets.lit(x) else { continue };
         let [from, to] = facets.ends(x, lit);
@@ -316,7 +319,7 @@ fn quadrature<const ACROSS: usize, const ALONG: usize>(
     sum * 4.0 / TAU
 }
 
-/// [`crate::materials::fresnel::dielectric`] from outside in `f64`.
+/// [`crate::materials::fresnel::dielectric`] from outside, in `f64`.
 pub fn dielectric(cosine: f64, eta: f64) -> f64 {
     let root = (eta * eta - 1.0 + cosine * cosine).sqrt();
     let square = |over: f64, under: f64| if under > 0.0 { (over / under) * (over / under) } else { 0.0 };
@@ -324,7 +327,8 @@ pub fn dielectric(cosine: f64, eta: f64) -> f64 {
     0.5 * (parallel + square(cosine - root, cosine + root))
 }
 
-/// Reflectance of a base under a coat for light that has come through: kd/(1 − kd·F_dr), with what the coat returns inside.
+/// Effective reflectance of a diffuse base under a coat, for light already inside: kd/(1 − kd·F_dr), where `returned` is the
+/// coat's internal reflectance F_dr.
 pub fn under_coat(diffuse: Vec3, returned: f32) -> Vec3 {
     diffuse / (Vec3::ONE - diffuse * returned)
 }
@@ -334,8 +338,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn polynomials_are_those_of_the_quadrature_or_just_above() {
-        /// The reflectance of facets by the cosine, for an index of refraction.
+    fn polynomials_are_tight_upper_bounds() {
+        /// Facet reflectance as a function of the cosine and the index of refraction.
         type Reflectance = fn(f64, f64) -> f64;
         let grazing: Reflectance = |cosine, _| (1.0 - cosine).powi(5);
         let normal: Reflectance = |cosine, _| 1.0 - (1.0 - cosine).powi(5);
@@ -354,10 +358,10 @@ mod tests {
         }
     }
 
-    /// Walks over visible normals in many equal steps, without knowing where light is mirrored to.
+    /// Integrates over visible normals with many uniform steps, ignoring where light is reflected to.
     fn plain_quadrature(cosine: f64, alpha: f64, reflectance: impl Fn(f64) -> f64) -> f64 {
         const STEPS: i32 = 600;
-        let facets = Facets::new(cosine, alpha);
+        let facets = VisibleFacets::new(cosine, alpha);
         let place = |i: i32| (f64::from(i) + 0.5) / f64::from(STEPS);
         let (mut sum, count) = (0.0, f64::from(STEPS * STEPS));
         for i in 0..STEPS * STEPS {
@@ -373,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn the_quadrature_is_that_of_the_whole_disk() {
+    fn quadrature_matches_brute_force() {
         for alpha in [0.003, 0.1, 0.4, 1.0] {
             for cosine in [0.05, 0.2, 0.6, 1.0] {
                 for (eta, fresnel) in [(1.5, dielectric as fn(f64, f64) -> f64), (0.0, |_, _| 1.0)] {
@@ -387,8 +391,8 @@ mod tests {
     }
 
     #[test]
-    fn smooth_lobes_reflect_as_fresnel_says() {
-        // 2 ∫ F(μ) μ dμ of η = 1.5.
+    fn smooth_lobes_match_fresnel() {
+        // 2 ∫ F(μ) μ dμ for η = 1.5.
         let smooth = LobeAlbedo::known(|cosine| dielectric(cosine, 1.5));
         assert!((smooth.mean - 0.091_778_0).abs() < 2e-5, "{}", smooth.mean);
         let narrow = LobeAlbedo::of(0.001, |cosine| dielectric(cosine, 1.5));
@@ -396,16 +400,16 @@ mod tests {
     }
 
     #[test]
-    fn tables_agree_with_single_rows_between_their_own() {
+    fn tables_interpolate_single_entries() {
         let fresnel = |cosine: f64| dielectric(cosine, 1.5);
         let alpha = |roughness: f32| (roughness * roughness).max(0.001);
         let table = AlbedoTable::new(None, alpha, fresnel);
         for roughness in [0.0, 0.1, 0.23, 0.5, 0.77, 1.0] {
             let single = AlbedoTable::new(Some(roughness), alpha, fresnel).at(roughness);
-            let mixed = table.at(roughness);
-            assert!((mixed.mean - single.mean).abs() < 5e-4);
+            let lerp = table.at(roughness);
+            assert!((lerp.mean - single.mean).abs() < 5e-4);
             for cosine in [0.05, 0.1, 0.3, 0.6, 1.0] {
-                let (one, other) = (mixed.at(cosine), single.at(cosine));
+                let (one, other) = (lerp.at(cosine), single.at(cosine));
                 assert!(
                     (one - other).abs() < 2e-3,
                     "roughness {roughness}, μ {cosine}: {one} is not {other}"

@@ -1,4 +1,4 @@
-//! The levels of a texture, each with half as many columns and rows as the one before (Williams, *Pyramidal Parametrics*, 1983).
+//! Mip levels of a texture, each with half the columns and rows of the previous one (Williams, *Pyramidal Parametrics*, 1983).
 
 use std::iter::Sum;
 use std::ops::Mul;
@@ -6,14 +6,14 @@ use std::ops::Mul;
 use super::texels::{TexelData, Texels};
 use crate::math::{Vec3, Vec4};
 
-/// All levels of an image but the image itself, in linear light; the last has one texel.
+/// All mip levels of an image except the image itself, in linear light. The last level has one texel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mipmaps {
     levels: Vec<Texels>,
 }
 
 impl Mipmaps {
-    /// Makes each level from the one before; `halve` may fail.
+    /// Computes each level from the previous one with `halve`, which may fail.
     ///
     /// # Errors
     /// The errors of `halve`.
@@ -27,22 +27,22 @@ impl Mipmaps {
         Ok(Self { levels })
     }
 
-    /// Level `number` ≥ 1; beyond the last, the last.
+    /// Level `number` ≥ 1; beyond the last level, the last.
     pub fn level(&self, number: usize) -> Option<&Texels> {
         self.levels.get(number - 1).or(self.levels.last())
     }
 
-    /// Number of levels beside the image.
+    /// Number of levels, not counting the image.
     pub fn count(&self) -> usize {
         self.levels.len()
     }
 
-    /// Bytes that the levels take.
+    /// Bytes used by the levels.
     pub fn memory_bytes(&self) -> usize {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// Bytes of the levels of an image of so many columns and rows, weighted or not.
+    /// Bytes used by the levels of an image of this size, with or without alpha.
     pub fn memory_bytes_of(width: u32, height: u32, is_weighted: bool) -> u64 {
         let texel_bytes = if is_weighted { size_of::<Vec4>() } else { size_of::<Vec3>() };
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
@@ -55,14 +55,14 @@ impl Mipmaps {
 }
 
 /// Halves an image row by row.
-pub struct Halving<'a> {
+pub struct ImageHalver<'a> {
     of: &'a Texels,
     width: u32,
     height: u32,
 }
 
-impl<'a> Halving<'a> {
-    /// A halving of this image.
+impl<'a> ImageHalver<'a> {
+    /// Prepares to halve an image.
     pub fn new(of: &'a Texels) -> Self {
         Self { of, width: (of.width / 2).max(1), height: (of.height / 2).max(1) }
     }
@@ -72,7 +72,7 @@ impl<'a> Halving<'a> {
         self.height
     }
 
-    /// The smaller image without its rows.
+    /// Empty storage for the rows of the smaller image.
     pub fn start(&self) -> TexelData {
         let count = self.width as usize * self.height as usize;
         if self.of.is_weighted() {
@@ -82,12 +82,12 @@ impl<'a> Halving<'a> {
         }
     }
 
-    /// Appends a row of the smaller image: every texel is the mean over the area of the larger one that it covers, so that the
-    /// mean of the whole stays, even if a side is odd.
+    /// Appends a row of the smaller image. Each texel is the mean over the area that it covers in the larger image, so that the
+    /// overall mean is preserved even for odd sizes.
     pub fn row(&self, y: u32, to: &mut TexelData) {
-        let rows = Covered::new(y, self.height, self.of.height);
+        let rows = CoveredTexels::new(y, self.height, self.of.height);
         for x in 0..self.width {
-            let columns = Covered::new(x, self.width, self.of.width);
+            let columns = CoveredTexels::new(x, self.width, self.of.width);
             match to {
                 TexelData::FloatAlpha(texels) => {
                     let texel =
@@ -103,21 +103,21 @@ impl<'a> Halving<'a> {
         }
     }
 
-    /// The smaller image of these rows.
+    /// Assembles the smaller image from its rows.
     pub fn texels(&self, rows: TexelData) -> Texels {
         Texels { width: self.width, height: self.height, data: rows, unusable: 0 }
     }
 }
 
-/// Up to three texels along a side that one of the smaller image covers.
-struct Covered {
+/// Up to three texels of the larger image, along one axis, that a texel of the smaller image covers.
+struct CoveredTexels {
     first: u32,
     weights: [f32; 3],
 }
 
-impl Covered {
+impl CoveredTexels {
     fn new(index: u32, of: u32, from: u32) -> Self {
-        // In units of 1/`of`, a texel of the larger image takes `of` and one of the smaller image `from`.
+        // In units of 1/`of`, a texel of the larger image is `of` wide and a texel of the smaller image is `from` wide.
         let (start, end) = (u64::from(index) * u64::from(from), u64::from(index + 1) * u64::from(from));
         let first = start / u64::from(of);
         let weight = |next: u64| {
@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     fn halved(of: &Texels) -> Result<Texels, ()> {
-        let halving = Halving::new(of);
+        let halving = ImageHalver::new(of);
         let mut rows = halving.start();
         (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
         Ok(halving.texels(rows))
@@ -152,10 +152,10 @@ mod tests {
     }
 
     #[test]
-    fn every_level_has_the_mean_of_the_image() {
+    fn every_level_preserves_the_mean() {
         for (width, height) in [(1, 1), (2, 2), (64, 32), (5, 3), (7, 1), (13, 64), (100, 37)] {
             let image = image(width, height);
-            let mipmaps = Mipmaps::of(&image, halved).expect("nothing ends it");
+            let mipmaps = Mipmaps::of(&image, halved).expect("halving succeeds");
             assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::memory_bytes_of(width, height, false));
             for number in 1..=mipmaps.count() {
                 let level = mipmaps.level(number).expect("a level");
@@ -171,14 +171,14 @@ mod tests {
     }
 
     #[test]
-    fn an_even_level_is_of_means_of_four_and_an_odd_one_of_parts() {
+    fn odd_sizes_weight_partly_covered_texels() {
         let four = Texels {
             width: 2,
             height: 2,
             data: TexelData::Srgb8(vec![[0; 3], [0; 3], [255; 3], [255; 3]]),
             unusable: 0,
         };
-        // The mean is taken in linear light, not of the bytes.
+        // The mean is computed in linear light, not from the bytes.
         assert_eq!(halved(&four).expect("made").get(0, 0), Vec3::splat(0.5));
         let line = |values: &[f32]| Texels {
             width: values.len() as u32,

@@ -1,4 +1,4 @@
-//! Normal maps in tangent space.
+//! Tangent-space normal maps.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 
-/// A texture of normals, (n + 1)/2 in linear numbers, with z away from the surface.
+/// A tangent-space normal map: linear values (n + 1)/2, with z pointing away from the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalMap {
     /// The normals.
@@ -17,12 +17,12 @@ pub struct NormalMap {
 }
 
 impl NormalMap {
-    /// The bent shading normal, on the same side as `normal`. The tangents need not be unit vectors or perpendicular;
-    /// if they are 0, any frame of the normal serves.
+    /// The perturbed shading normal, on the same side as `normal`. The tangents need not be unit vectors or perpendicular; if
+    /// they are 0, an arbitrary frame is used.
     #[inline]
-    pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
+    pub fn perturb(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
-        let slope = self.texture.unmirrored(at, mapped.truncate() * self.strength);
+        let slope = self.texture.unmirrored_slopes(at, mapped.truncate() * self.strength);
         let [dpdu, dpdv] = self.texture.own_tangents(self.texture.tangents(at, [dpdu, dpdv]));
         let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
@@ -30,7 +30,7 @@ impl NormalMap {
     }
 }
 
-/// Unit tangents along u and v, perpendicular to the normal; mirrored parametrisations keep their sense.
+/// Unit tangents along u and v, perpendicular to the normal. Mirrored parameterizations keep their handedness.
 fn tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
     let Some(tangent) = (dpdu - normal * normal.dot(dpdu)).try_normalize() else {
         let frame = Frame::from_normal(normal);
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
     use crate::materials::footprint::UvSet;
     use crate::materials::texels::{TexelData, Texels};
-    use crate::materials::texture::{Moved, TextureFilter, Wrap};
+    use crate::materials::texture::{TextureFilter, UvTransform, Wrap};
     use crate::math::{DVec2, Vec2};
 
     fn middle() -> TexturePoint {
@@ -69,32 +69,32 @@ mod tests {
     }
 
     #[test]
-    fn slopes_turn_with_their_texture() {
+    fn slopes_rotate_with_the_texture() {
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
         let texture = Arc::make_mut(&mut turned.texture);
-        texture.moved = Moved::new(UvSet::First, 90.0, DVec2::ZERO).map(Box::new);
+        texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::ZERO).map(Box::new);
         // The texture's first coordinate is −v.
-        let bent = turned.bend(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
+        let bent = turned.perturb(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
-        // Coordinates that are turned, stretched and skewed: those of the texture are u' = 2 u cos + 3 v sin, and v' = 3 v cos − 2 u
-        // sin with an angle of −30°; its tangent along u' is that of the point where v' stays.
+        // Rotated, stretched and skewed coordinates: the texture's are u' = 2 u cos + 3 v sin and v' = 3 v cos − 2 u sin with an
+        // angle of −30°. Its tangent along u' is the one along which v' is constant.
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
         let texture = Arc::make_mut(&mut turned.texture);
         (texture.moved, texture.repeat) =
-            (Moved::new(UvSet::First, -30.0, DVec2::ZERO).map(Box::new), Vec2::new(2.0, 3.0));
+            (UvTransform::new(UvSet::First, -30.0, DVec2::ZERO).map(Box::new), Vec2::new(2.0, 3.0));
         let (dpdu, dpdv) = (Vec3::new(2.0, 0.5, 0.0), Vec3::new(-0.3, 0.7, 0.0));
         let (sine, cosine) = 30.0_f32.to_radians().sin_cos();
         // u' changes by 1 where 2 u = cos and 3 v = sin.
         let along = dpdu * (cosine / 2.0) + dpdv * (sine / 3.0);
-        let bent = turned.bend(&middle(), Vec3::Z, dpdu, dpdv);
+        let bent = turned.perturb(&middle(), Vec3::Z, dpdu, dpdv);
         let expected = along.normalize() * 0.6 + Vec3::Z * 0.8;
         assert!((bent - expected).length() < 1e-6, "{bent}, not {expected}");
     }
 
     #[test]
-    fn slopes_are_mirrored_with_their_texture() {
+    fn slopes_are_mirrored_with_the_texture() {
         let leaning = Vec3::new(0.48, 0.36, 0.8);
-        // (repeat, wrap, texture coordinates, sides of the slopes)
+        // (repeat, wrap, texture coordinates, signs of the slopes)
         let cases = [
             (Vec2::new(1.0, 1.0), Wrap::Repeat, DVec2::new(1.5, 2.5), [1.0, 1.0]),
             (Vec2::new(-1.0, 1.0), Wrap::Repeat, DVec2::new(0.5, 0.5), [-1.0, 1.0]),
@@ -108,28 +108,28 @@ mod tests {
             let mut map = map(leaning);
             let texture = Arc::make_mut(&mut map.texture);
             (texture.repeat, texture.wrap) = (repeat, wrap);
-            let bent = map.bend(&TexturePoint::sharp(uv), Vec3::Z, Vec3::X, Vec3::Y);
+            let bent = map.perturb(&TexturePoint::sharp(uv), Vec3::Z, Vec3::X, Vec3::Y);
             let expected = Vec3::new(0.48 * sides[0], 0.36 * sides[1], 0.8);
             assert!((bent - expected).length() < 1e-6, "{repeat} {wrap:?} {uv}: {bent}");
         }
     }
 
     #[test]
-    fn a_flat_map_changes_nothing_and_a_tilt_follows_the_tangents() {
+    fn normal_map_tilts_follow_the_tangents() {
         let n = Vec3::Z;
-        assert_eq!(map(Vec3::Z).bend(&middle(), n, Vec3::X, Vec3::Y), n);
+        assert_eq!(map(Vec3::Z).perturb(&middle(), n, Vec3::X, Vec3::Y), n);
         let tilted = map(Vec3::new(0.6, 0.0, 0.8));
-        let bent = tilted.bend(&middle(), n, Vec3::new(0.0, 3.0, 1.0), Vec3::new(-2.0, 0.0, 0.0));
+        let bent = tilted.perturb(&middle(), n, Vec3::new(0.0, 3.0, 1.0), Vec3::new(-2.0, 0.0, 0.0));
         assert!((bent - Vec3::new(0.0, 0.6, 0.8)).length() < 1e-6);
-        // A mirrored parametrisation bends the other way along v.
+        // A mirrored parameterization perturbs in the opposite direction along v.
         let along_v = map(Vec3::new(0.0, 0.6, 0.8));
-        let bent = along_v.bend(&middle(), n, Vec3::X, Vec3::NEG_Y);
+        let bent = along_v.perturb(&middle(), n, Vec3::X, Vec3::NEG_Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6);
     }
 
     #[test]
-    fn without_tangents_the_normal_is_still_a_unit_vector_on_its_side() {
-        let bent = map(Vec3::new(0.6, 0.0, -0.8)).bend(&middle(), Vec3::Y, Vec3::ZERO, Vec3::ZERO);
+    fn missing_tangents_give_a_valid_normal() {
+        let bent = map(Vec3::new(0.6, 0.0, -0.8)).perturb(&middle(), Vec3::Y, Vec3::ZERO, Vec3::ZERO);
         assert!((bent.length() - 1.0).abs() < 1e-6 && bent.y > 0.0);
     }
 }

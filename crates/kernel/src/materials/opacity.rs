@@ -1,19 +1,20 @@
-//! Opacity of surfaces: the chance that a surface is there.
+//! Opacity of surfaces.
 
 use super::footprint::TexturePoint;
-use super::number::Number;
+use super::scalar::Number;
 
-/// The chance that a surface is there. Rays pass the rest of it straight on, as if it were not there.
+/// The probability that a surface exists at a point. Otherwise, rays pass undeflected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Opacity {
-    /// The chance, clamped to [0, 1].
+    /// The opacity, clamped to [0, 1].
     pub value: Number,
-    /// Chance from which the surface is there, below which it is not; 0 for none. Mip levels of a texture are those of its coverage.
+    /// Threshold at and above which the surface is opaque, and below which it is fully transparent; 0 for no threshold. With a
+    /// threshold, a texture's mip levels hold the coverage: the fraction of texels that are opaque.
     pub cutoff: f32,
 }
 
 impl Opacity {
-    /// The chance at texture coordinates, in [0, 1]; adds to `lookups`.
+    /// The opacity at texture coordinates, in [0, 1]. Adds to `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
         match &self.value {
@@ -25,12 +26,12 @@ impl Opacity {
         }
     }
 
-    /// The chance, if it is the same everywhere.
+    /// The opacity, if it is constant.
     pub fn constant(&self) -> Option<f32> {
         self.value.constant().map(|value| self.cut(value))
     }
 
-    /// The mean chance; that of a texture with a cutoff is estimated by its mean.
+    /// The mean opacity; for a texture with a cutoff, estimated by the texture's mean.
     pub fn mean(&self) -> f32 {
         match &self.value {
             Number::Constant(value) => self.cut(*value),

@@ -1,41 +1,41 @@
-//! Texels of an image, stored as compactly as in its file.
+//! Texels of an image, stored as compactly as in the file.
 
 use crate::math::color::{LINEAR_OF_SRGB8, srgb8_to_linear};
 use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
 use crate::math::{DVec3, DVec4, Vec3, Vec4};
 
-/// An image in memory, rows from top to bottom, RGB.
+/// An RGB image in memory, with rows from top to bottom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texels {
     /// Columns, ≥ 1.
     pub width: u32,
     /// Rows, ≥ 1.
     pub height: u32,
-    /// `width·height` texels.
+    /// The texels, `width · height` of them.
     pub data: TexelData,
-    /// Number of texels that were negative or not finite in the file, and are 0 here.
+    /// Number of texels that were negative or not finite in the file; they are stored as 0.
     pub unusable: u64,
 }
 
-/// Storage of texels.
+/// Storage format of texels.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TexelData {
-    /// sRGB bytes, decoded at each look-up.
+    /// sRGB bytes, decoded at each lookup.
     Srgb8(Vec<[u8; 3]>),
     /// Bytes / 255, linear.
     Linear8(Vec<[u8; 3]>),
-    /// Linear floats: 16-bit and float files.
+    /// Linear floats, from 16-bit and floating-point files.
     Float(Vec<Vec3>),
-    /// sRGB bytes and alpha, which weights them between texels.
+    /// sRGB bytes and alpha; interpolation weights the colors by alpha.
     SrgbAlpha8(Vec<[u8; 4]>),
     /// Linear bytes and alpha.
     LinearAlpha8(Vec<[u8; 4]>),
-    /// Linear floats, multiplied by alpha, and alpha.
+    /// Linear floats premultiplied by alpha, and alpha.
     FloatAlpha(Vec<Vec4>),
 }
 
 impl Texels {
-    /// Linear value of column `x`, row `y` from the top; both in range.
+    /// Linear value at column `x` and row `y` from the top, which must be in range.
     #[inline]
     pub fn get(&self, x: u32, y: u32) -> Vec3 {
         self.at(y as usize * self.width as usize + x as usize)
@@ -54,7 +54,7 @@ impl Texels {
         }
     }
 
-    /// Whether alpha weights the texels.
+    /// Whether the texels have alpha, which weights their colors.
     #[inline(always)]
     pub fn is_weighted(&self) -> bool {
         match &self.data {
@@ -63,7 +63,7 @@ impl Texels {
         }
     }
 
-    /// Linear color at an index of weighted data.
+    /// Linear color, not premultiplied, at an index of data with alpha.
     #[cold]
     fn without_weight(&self, place: usize) -> Vec3 {
         match &self.data {
@@ -80,7 +80,7 @@ impl Texels {
         }
     }
 
-    /// Linear color at an index of the data, multiplied by its weight, and the weight.
+    /// Linear color premultiplied by alpha, and alpha, at an index of the data.
     pub fn weighted(&self, place: usize) -> Vec4 {
         let weight = match &self.data {
             TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => 1.0,
@@ -92,29 +92,28 @@ impl Texels {
         (self.at(place) * weight).extend(weight)
     }
 
-    /// Texels of 1 where this one is at least `least`, and 0 elsewhere.
+    /// Thresholds the red channel: 1 where it is at least `least`, otherwise 0.
     pub fn cut(&self, least: f32) -> Self {
         let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
         let data = TexelData::Linear8((0..self.len()).map(texel).collect());
         Self { data, unusable: 0, ..*self }
     }
 
-    /// Linear values at some indices of the data.
+    /// Linear values at several indices of the data.
     #[inline(always)]
-    pub fn at_each<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
+    pub fn gather<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
         let mut values = [Vec3::ZERO; N];
         self.decode(places, |i, value| values[i] = value);
         values
     }
 
-    /// Linear values at indices of the data, side by side. Written in place: rows are larger than compilers like to
-    /// return.
+    /// Linear values at a packet of indices. Written in place, because compilers handle large return values poorly.
     #[inline(always)]
-    pub fn fill_row(&self, places: &[usize; PACKET_SIZE], values: &mut Vec3x16) {
+    pub fn gather_packet(&self, places: &[usize; PACKET_SIZE], values: &mut Vec3x16) {
         self.decode(places, |i, value| set_lane(values, i, value));
     }
 
-    /// Gives the linear value at each index of the data.
+    /// Passes the linear value at each index to `put`.
     #[inline(always)]
     fn decode<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
         match &self.data {
@@ -181,7 +180,7 @@ impl Texels {
     }
 
     /// Whether red, green and blue are equal in all texels.
-    pub fn is_grey(&self) -> bool {
+    pub fn is_gray(&self) -> bool {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => {
                 bytes.iter().all(|[r, g, b]| r == g && g == b)
@@ -215,12 +214,12 @@ impl Texels {
         self.width as usize * self.height as usize
     }
 
-    /// Never: an image has at least one texel.
+    /// Always false: an image has at least one texel.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes that the texels take.
+    /// Bytes used by the texels.
     pub fn memory_bytes(&self) -> usize {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => size_of_val(bytes.as_slice()),
@@ -231,7 +230,7 @@ impl Texels {
     }
 }
 
-/// A color without the weight that it is multiplied by; black without weight.
+/// Divides a premultiplied color by its alpha. Black if alpha is 0.
 pub fn unweighted(weighted: Vec4) -> Vec3 {
     if weighted.w > 0.0 { weighted.truncate() / weighted.w } else { Vec3::ZERO }
 }

@@ -1,8 +1,8 @@
-//! Texture look-up.
+//! Texture lookup.
 
 use std::sync::Arc;
 
-use super::footprint::{SecondPoint, TexturePoint, UvSet};
+use super::footprint::{SecondUvPoint, TexturePoint, UvSet};
 use super::mipmaps::Mipmaps;
 use super::texels::{Texels, unweighted};
 use crate::choice;
@@ -14,121 +14,121 @@ use crate::math::{DVec2, Vec2, Vec3, Vec4};
 choice! {
     /// Texture interpolation.
     pub enum TextureFilter {
-        /// The texel that holds the point.
+        /// The texel that contains the point.
         Nearest = "nearest",
-        /// Between the four nearest texel centres.
+        /// Bilinear interpolation between the four nearest texel centers.
         Bilinear = "bilinear",
-        /// The same between two levels of the texture, as far as a pixel sees it.
+        /// Trilinear interpolation between two mip levels, chosen by the footprint of the pixel.
         Mipmap = "mipmap",
     }
 }
 
 choice! {
-    /// Continuation of a texture outside [0, 1].
+    /// How a texture continues outside [0, 1].
     pub enum Wrap {
         /// Periodic.
         Repeat = "repeat",
-        /// The border's texels.
+        /// The texels at the border.
         Clamp = "clamp",
-        /// Periodic, every second tile mirrored.
+        /// Periodic, with every other tile mirrored.
         Mirror = "mirror",
     }
 }
 
-/// An image with its look-up settings.
+/// An image with its lookup settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// The image.
     pub texels: Arc<Texels>,
-    /// Its mip levels, if the filter is [`TextureFilter::Mipmap`].
+    /// Mip levels, if the filter is [`TextureFilter::Mipmap`].
     pub mipmaps: Option<Arc<Mipmaps>>,
     /// Interpolation.
     pub filter: TextureFilter,
-    /// Continuation outside [0, 1].
+    /// How the texture continues outside [0, 1].
     pub wrap: Wrap,
     /// Number of repetitions in u and v.
     pub repeat: Vec2,
-    /// Motion of the repeated coordinates. `None` if those of the first set stay.
-    pub moved: Option<Box<Moved>>,
-    /// Change of what is looked up. `None` if it stays; heights and their slopes do.
+    /// Transform applied after repetition. `None` for the identity on the first UV set.
+    pub moved: Option<Box<UvTransform>>,
+    /// Scale and offset of looked-up values. `None` for the identity. Not used for heights and their slopes.
     pub factor: Option<Factor>,
 }
 
-/// A factor on looked-up values, and a summand.
+/// Scale and offset of looked-up values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor {
-    /// The factor.
+    /// The scale.
     pub gain: Vec3,
-    /// The summand.
+    /// The offset, added after scaling.
     pub base: Vec3,
 }
 
 impl Factor {
-    /// A factor without a summand. `None` if it is 1.
+    /// A scale without an offset. `None` if it is 1.
     pub fn new(gain: Vec3) -> Option<Self> {
         Self::with_base(gain, Vec3::ZERO)
     }
 
-    /// `None` if it changes nothing.
+    /// A scale and an offset. `None` for the identity.
     pub fn with_base(gain: Vec3, base: Vec3) -> Option<Self> {
         (gain != Vec3::ONE || base != Vec3::ZERO).then_some(Self { gain, base })
     }
 
-    /// A value with the change.
+    /// The scaled value plus the offset.
     #[inline]
     fn of(&self, value: Vec3) -> Vec3 {
         value * self.gain + self.base
     }
 }
 
-/// Choice and motion of texture coordinates: of a set, a rotation, then a translation.
+/// Choice of a UV set and a transform: rotation followed by translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moved {
-    /// Sine and cosine of the angle, from u to v.
+pub struct UvTransform {
+    /// Sine and cosine of the rotation from u to v.
     turn: (f64, f64),
     /// Translation.
     offset: DVec2,
-    /// The coordinates that are moved.
+    /// The UV set to transform.
     of: UvSet,
 }
 
-impl Moved {
-    /// The motion of coordinates by an angle in degrees about the origin, then by an offset. `None` if it changes nothing.
+impl UvTransform {
+    /// A transform that rotates about the origin by an angle in degrees, then translates. `None` if it changes nothing.
     pub fn new(of: UvSet, degrees: f64, offset: DVec2) -> Option<Self> {
         let is_moved = of != UvSet::First || degrees != 0.0 || offset != DVec2::ZERO;
         is_moved.then(|| Self { turn: sin_cos_degrees(degrees), offset, of })
     }
 
-    /// The second coordinates at a place, if they are the ones that are moved.
+    /// The second UV set's point, if the transform uses that set.
     #[inline]
-    fn second<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondPoint> {
+    fn second<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondUvPoint> {
         match self.of {
             UvSet::First => None,
             UvSet::Second => at.second.as_deref(),
         }
     }
 
-    /// The moved coordinates.
+    /// Transforms a point.
     #[inline]
     fn point(&self, at: DVec2) -> DVec2 {
         self.vector(at) + self.offset
     }
 
-    /// A moved difference of coordinates.
+    /// Transforms a vector.
     #[inline]
     fn vector(&self, by: DVec2) -> DVec2 {
         let (sin, cos) = self.turn;
         DVec2::new(by.x * cos - by.y * sin, by.x * sin + by.y * cos)
     }
 
-    /// The difference of coordinates that moves to this one.
+    /// The vector that is transformed to `moved`.
     #[inline]
-    pub fn vector_before(&self, moved: DVec2) -> DVec2 {
+    pub fn inverse_vector(&self, moved: DVec2) -> DVec2 {
         let (sin, cos) = self.turn;
         DVec2::new(moved.x * cos + moved.y * sin, moved.y * cos - moved.x * sin)
     }
 
-    /// Repeated and moved coordinates, side by side.
+    /// Repeats and transforms a packet of coordinates.
     fn row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
         for i in 0..PACKET_SIZE {
@@ -139,17 +139,17 @@ impl Moved {
     }
 }
 
-/// A colour, or a texture of colours.
+/// A color parameter, constant or textured.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Color {
-    /// The same everywhere.
+    /// A constant color.
     Constant(Vec3),
-    /// A texture, to be looked up.
+    /// A color texture.
     Texture(Arc<Texture>),
 }
 
 impl Color {
-    /// The colour, if it is the same everywhere.
+    /// The constant color. `None` for a texture.
     pub fn constant(&self) -> Option<Vec3> {
         match self {
             Self::Constant(color) => Some(*color),
@@ -157,7 +157,7 @@ impl Color {
         }
     }
 
-    /// The texture. `None` if the colour is the same everywhere.
+    /// The texture. `None` for a constant.
     pub fn texture(&self) -> Option<&Arc<Texture>> {
         match self {
             Self::Constant(_) => None,
@@ -165,7 +165,7 @@ impl Color {
         }
     }
 
-    /// The colour at texture coordinates; adds to `lookups`.
+    /// The color at texture coordinates. Adds to `lookups`.
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Constant(color) => *color,
@@ -178,14 +178,14 @@ impl Color {
 }
 
 impl Texture {
-    /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
+    /// The linear value at texture coordinates; v = 0 is the bottom row. Non-finite coordinates count as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.tiles(at);
         let value = self.in_tiles(tiles, || self.level(at));
         self.factor.map_or(value, |factor| factor.of(value))
     }
 
-    /// The value at coordinates of the tiles, at this level if the filter has levels.
+    /// The value at tile coordinates; `level` is called if the filter uses mip levels.
     #[inline]
     fn in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
@@ -196,7 +196,7 @@ impl Texture {
         }
     }
 
-    /// Coordinates that are repeated and moved: 1 is the width of the image.
+    /// Repeated and transformed coordinates, in units of the image size.
     #[inline]
     fn tiles(&self, at: &TexturePoint) -> DVec2 {
         let repeat = self.repeat.as_dvec2();
@@ -204,21 +204,21 @@ impl Texture {
         moved.point(moved.second(at).map_or(at.uv, |second| second.uv) * repeat)
     }
 
-    /// The set of coordinates that it is looked up by.
+    /// The UV set used for lookups.
     #[inline]
     pub fn uv_set(&self) -> UvSet {
         self.moved.as_ref().map_or(UvSet::First, |moved| moved.of)
     }
 
-    /// Changes of the point with the coordinates that it is looked up by; `first` are those with the first set.
+    /// Tangents ∂p/∂u and ∂p/∂v of the UV set used for lookups; `first` are the tangents of the first set.
     #[inline]
     pub fn tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
         let second = self.moved.as_ref().and_then(|moved| moved.second(at));
         second.map_or(first, |second| second.tangents)
     }
 
-    /// Changes of the red channel with u and v, by central differences: over a texel, or over one of the level that the footprint
-    /// chooses.
+    /// Slopes of the red channel along u and v, from central differences over one texel of the image or of the mip level chosen
+    /// by the footprint.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
         let tiles = self.tiles(at);
         let level = match (self.filter, &self.mipmaps) {
@@ -231,14 +231,14 @@ impl Texture {
         let change = |half: DVec2| beside(half) - beside(-half);
         let changes =
             Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
-        // Turn the gradient back from the image's coordinates to those of the surface.
+        // Rotate the gradient from image coordinates back to surface coordinates.
         let slopes = changes.as_dvec2() / steps;
-        let slopes = self.moved.as_ref().map_or(slopes, |moved| moved.vector_before(slopes));
+        let slopes = self.moved.as_ref().map_or(slopes, |moved| moved.inverse_vector(slopes));
         slopes.as_vec2() * self.repeat
     }
 
-    /// Slopes in the image, as slopes along the texture's own coordinates: the wrap may mirror them.
-    pub fn unmirrored(&self, at: &TexturePoint, slopes: Vec2) -> Vec2 {
+    /// Converts slopes in the image to slopes along the texture's own coordinates, which [`Wrap::Mirror`] may flip.
+    pub fn unmirrored_slopes(&self, at: &TexturePoint, slopes: Vec2) -> Vec2 {
         if self.wrap != Wrap::Mirror {
             return slopes;
         }
@@ -246,17 +246,17 @@ impl Texture {
         slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirrored_tile(tile) as f32))
     }
 
-    /// The changes of a point with the texture's own coordinates, which are repeated, turned and moved, but for their lengths.
+    /// Tangents along the texture's repeated and transformed coordinates, up to their lengths.
     pub fn own_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
         let sides = self.repeat.signum();
         let Some(moved) = &self.moved else { return [dpdu * sides.x, dpdv * sides.y] };
         [DVec2::X, DVec2::Y].map(|axis| {
-            let by = moved.vector_before(axis).as_vec2() / self.repeat;
+            let by = moved.inverse_vector(axis).as_vec2() / self.repeat;
             dpdu * by.x + dpdv * by.y
         })
     }
 
-    /// Number of texels in a unit of u and v.
+    /// Number of texels per unit of u and v.
     pub fn texels_across(&self) -> [f64; 2] {
         let (size, repeat) = (size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
         let Some(moved) = &self.moved else { return (size * repeat).abs().to_array() };
@@ -264,12 +264,12 @@ impl Texture {
         [along(DVec2::X), along(DVec2::Y)]
     }
 
-    /// [`Texture::lookup`] side by side, for a texture without mip levels.
+    /// [`Texture::lookup`] for a packet, for textures without mip levels.
     #[inline(always)]
     pub fn lookup_row(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
             None => self.repeated_row(uv, self.repeat.as_dvec2()),
-            Some(moved) => self.moved_row(moved, uv),
+            Some(moved) => self.transformed_row(moved, uv),
         };
         if let Some(factor) = self.factor {
             let (gain, base) = (factor.gain.to_array(), factor.base.to_array());
@@ -280,14 +280,14 @@ impl Texture {
         row
     }
 
-    /// [`Texture::lookup_row`] of a texture whose coordinates are moved.
+    /// [`Texture::lookup_row`] for textures with a transform.
     #[cold]
     #[inline(never)]
-    fn moved_row(&self, moved: &Moved, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
+    fn transformed_row(&self, moved: &UvTransform, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         self.repeated_row(&moved.row(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
-    /// [`Texture::lookup_row`] at coordinates times a factor.
+    /// [`Texture::lookup_row`] at coordinates scaled by `repeat`.
     #[inline(always)]
     fn repeated_row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, size(&self.texels));
@@ -309,7 +309,7 @@ impl Texture {
         let rows = self.wrap.index_row(&first[1], 0, extent[1]);
         let mut colors = [[0.0; PACKET_SIZE]; 3];
         if shift == 0.0 {
-            texels.fill_row(&places(&columns, &rows, extent), &mut colors);
+            texels.gather_packet(&places(&columns, &rows, extent), &mut colors);
             return colors;
         }
         if texels.is_weighted() {
@@ -319,10 +319,10 @@ impl Texture {
         let right = self.wrap.index_row(&first[0], 1, extent[0]);
         let upper = self.wrap.index_row(&first[1], 1, extent[1]);
         let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
-        texels.fill_row(&places(&columns, &rows, extent), &mut corners[0]);
-        texels.fill_row(&places(&right, &rows, extent), &mut corners[1]);
-        texels.fill_row(&places(&columns, &upper, extent), &mut corners[2]);
-        texels.fill_row(&places(&right, &upper, extent), &mut corners[3]);
+        texels.gather_packet(&places(&columns, &rows, extent), &mut corners[0]);
+        texels.gather_packet(&places(&right, &rows, extent), &mut corners[1]);
+        texels.gather_packet(&places(&columns, &upper, extent), &mut corners[2]);
+        texels.gather_packet(&places(&right, &upper, extent), &mut corners[3]);
         for i in 0..PACKET_SIZE {
             let corner = |number: usize| lane(&corners[number], i);
             let lower = corner(0).lerp(corner(1), part[0][i]);
@@ -332,14 +332,14 @@ impl Texture {
         colors
     }
 
-    /// Mean of its image, which is the mean of the texture if a whole number of tiles fits into u and v.
+    /// Mean of the image, which is the mean of the texture if a whole number of tiles fits into [0, 1]².
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
         self.factor.map_or(mean, |factor| factor.of(mean))
     }
 
-    /// The level at which the footprint is one texel, from 0 on; with a fraction between two levels.
+    /// The mip level (≥ 0, fractional) at which the footprint is one texel wide.
     fn level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
             None => at.footprint.texels(size(&self.texels) * self.repeat),
@@ -359,7 +359,7 @@ impl Texture {
         self.texels.at(place(column, row, extent))
     }
 
-    /// Interpolates between the two levels at `level`.
+    /// Interpolates between the two levels around `level`.
     fn trilinear(&self, level: f32, folded: [f32; 2]) -> Vec3 {
         let Some((near, far, part)) = self.levels(level) else { return self.bilinear(&self.texels, folded) };
         if self.texels.is_weighted() {
@@ -369,7 +369,7 @@ impl Texture {
         self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
     }
 
-    /// The two images next to a level, and the part of the second. `None` if the image itself is all that counts.
+    /// The two images around a mip level, and the weight of the second. `None` if only the image itself is used.
     #[inline(always)]
     fn levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
@@ -382,8 +382,8 @@ impl Texture {
         Some((of(number), of(number + 1), level - number as f32))
     }
 
-    /// The part of the footprint in which the value is at least `cutoff`: 0 or 1 in the image itself; the mip levels are those of
-    /// [`Texels::cut`].
+    /// The fraction of the footprint in which the red channel is at least `cutoff`; 0 or 1 if the lookup is in the image itself. The
+    /// mip levels must be those of [`Texels::cut`].
     pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
         let tiles = self.tiles(at);
         let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
@@ -399,7 +399,7 @@ impl Texture {
         near + (of(far) - near) * part
     }
 
-    /// Bilinear look-ups of weighted texels, side by side.
+    /// Bilinear lookups of a packet in texels with alpha.
     #[cold]
     #[inline(never)]
     fn weighted_row(&self, folded: &[F32x16; 2], colors: &mut Vec3x16) {
@@ -409,7 +409,7 @@ impl Texture {
         }
     }
 
-    /// Bilinear mean of texels multiplied by their weights, and of the weights.
+    /// Bilinear interpolation of premultiplied texels and their alpha.
     #[cold]
     #[inline(never)]
     fn weighted(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
@@ -423,39 +423,39 @@ impl Texture {
             return unweighted(self.weighted(texels, folded));
         }
         let (places, [fx, fy]) = self.corners(texels, folded);
-        let corners = texels.at_each(&places);
+        let corners = texels.gather(&places);
         let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
         lower.lerp(upper, fy)
     }
 
-    /// Indices of the four nearest texels, and the place between them.
+    /// Indices of the four nearest texels, and the interpolation weights.
     #[inline(always)]
     fn corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
         let (size, extent) = (size(texels), extent(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
         let first = [floor(x), floor(y)];
         let (fx, fy) = (x - first[0] as f32, y - first[1] as f32);
-        let [left, right] = self.wrap.neighbours(first[0], extent[0]);
-        let [bottom, top] = self.wrap.neighbours(first[1], extent[1]);
+        let [left, right] = self.wrap.neighbor_indices(first[0], extent[0]);
+        let [bottom, top] = self.wrap.neighbor_indices(first[1], extent[1]);
         let place = |column, row| place(column, row, extent);
         ([place(left, bottom), place(right, bottom), place(left, top), place(right, top)], [fx, fy])
     }
 }
 
-/// Floor of a number, without the call of a library that [`f32::floor`] is on processors that may lack an instruction for it.
+/// Rounds down without [`f32::floor`], which is a library call on processors that may lack an instruction for it.
 #[inline(always)]
 fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
     towards_zero - i32::from(towards_zero as f32 > x)
 }
 
-/// The index of a texel, from its column, and its row from the bottom.
+/// Index of a texel, from its column and its row counted from the bottom.
 #[inline(always)]
 fn place(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
     (height - 1 - row) as usize * width as usize + column as usize
 }
 
-/// [`place`] of each texel of a row.
+/// [`place`] for a packet of texels.
 #[inline(always)]
 fn places(columns: &[i32; PACKET_SIZE], rows: &[i32; PACKET_SIZE], extent: [i32; 2]) -> [usize; PACKET_SIZE] {
     let mut places = [0; PACKET_SIZE];
@@ -465,19 +465,19 @@ fn places(columns: &[i32; PACKET_SIZE], rows: &[i32; PACKET_SIZE], extent: [i32;
     places
 }
 
-/// Columns and rows.
+/// Width and height in texels.
 #[inline(always)]
 fn extent(texels: &Texels) -> [i32; 2] {
     [texels.width as i32, texels.height as i32]
 }
 
-/// Columns and rows as a vector.
+/// Width and height in texels, as a vector.
 fn size(texels: &Texels) -> Vec2 {
     Vec2::new(texels.width as f32, texels.height as f32)
 }
 
 impl Wrap {
-    /// Folds coordinates, repeated so often, into [0, 1].
+    /// Multiplies coordinates by `repeat` and folds them into [0, 1].
     #[inline(always)]
     fn fold_row(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
         let mut folded = [0.0; PACKET_SIZE];
@@ -496,7 +496,7 @@ impl Wrap {
         folded
     }
 
-    /// [`Wrap::index`] of numbers, each plus `more`.
+    /// [`Wrap::index`] of `numbers`, each increased by `more`.
     #[inline(always)]
     fn index_row(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
         let mut indices = [0; PACKET_SIZE];
@@ -528,30 +528,30 @@ impl Wrap {
         }
     }
 
-    /// An index and the next one, wrapped.
+    /// An index and the following one, both wrapped.
     #[inline(always)]
-    fn neighbours(self, first: i32, size: i32) -> [i32; 2] {
+    fn neighbor_indices(self, first: i32, size: i32) -> [i32; 2] {
         [self.index(first, size), self.index(first + 1, size)]
     }
 
-    /// Wraps an index that is at most one outside 0 … size − 1.
+    /// Wraps an index in −1 … size.
     #[inline(always)]
     fn index(self, i: i32, size: i32) -> i32 {
         match self {
             Self::Repeat => i + if i < 0 { size } else { 0 } - if i >= size { size } else { 0 },
-            // A mirrored border repeats its own texel.
+            // Mirroring repeats the border texel.
             Self::Clamp | Self::Mirror => i.max(0).min(size - 1),
         }
     }
 }
 
-/// −1 in the tiles that [`Wrap::Mirror`] mirrors, else 1.
+/// −1 in tiles that [`Wrap::Mirror`] mirrors, otherwise 1.
 fn mirrored_tile(x: f64) -> f64 {
     let x = finite(x);
     if x - 2.0 * (x * 0.5).floor() > 1.0 { -1.0 } else { 1.0 }
 }
 
-/// The coordinate, or 0 if it is not finite.
+/// Replaces non-finite coordinates with 0.
 #[inline(always)]
 fn finite(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }
@@ -561,10 +561,10 @@ fn finite(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::materials::footprint::Footprint;
-    use crate::materials::mipmaps::Halving;
+    use crate::materials::mipmaps::ImageHalver;
     use crate::materials::texels::TexelData;
 
-    /// A texture of [[0, 1], [2, 3]], bottom row first.
+    /// A texture with the values [[0, 1], [2, 3]], bottom row first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
@@ -576,7 +576,7 @@ mod tests {
     }
 
     #[test]
-    fn bilinear_look_ups_of_known_value() {
+    fn bilinear_lookups_of_known_values() {
         for (u, v, expected) in [(0.25, 0.25, 0.0), (0.5, 0.5, 1.5), (0.5, 0.25, 0.5), (0.75, 0.75, 3.0)] {
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
                 assert!((bilinear(wrap, u, v) - expected).abs() < 1e-6, "{wrap:?} at {u}, {v}");
@@ -588,7 +588,7 @@ mod tests {
     }
 
     #[test]
-    fn wrapping_outside_the_unit_square() {
+    fn coordinates_wrap_outside_the_unit_square() {
         assert!((bilinear(Wrap::Repeat, -0.75, 3.25) - bilinear(Wrap::Repeat, 0.25, 0.25)).abs() < 1e-5);
         assert!((bilinear(Wrap::Mirror, 1.25, 0.25) - bilinear(Wrap::Mirror, 0.75, 0.25)).abs() < 1e-5);
         assert!((bilinear(Wrap::Mirror, -0.25, -0.25) - bilinear(Wrap::Mirror, 0.25, 0.25)).abs() < 1e-5);
@@ -600,24 +600,24 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_are_repeated_then_turned_then_moved() {
+    fn coordinates_repeat_then_rotate_then_translate() {
         let at = |texture: &Texture, u: f64, v: f64| texture.lookup(&TexturePoint::sharp(DVec2::new(u, v))).x;
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.repeat = Vec2::new(2.0, 1.0);
-        texture.moved = Moved::new(UvSet::First, 90.0, DVec2::new(0.0, 0.5)).map(Box::new);
-        // (u, v) becomes (−v, 2u + ½): (.1, .3) is looked up at (−.3, .7), which is (.7, .7).
+        texture.moved = UvTransform::new(UvSet::First, 90.0, DVec2::new(0.0, 0.5)).map(Box::new);
+        // (u, v) maps to (−v, 2u + ½): (0.1, 0.3) is looked up at (−0.3, 0.7), which wraps to (0.7, 0.7).
         assert_eq!(at(&texture, 0.1, 0.3), 3.0);
         assert_eq!(at(&texture, 0.1, 0.7), 2.0);
         assert_eq!(at(&texture, 0.3, 0.3), 1.0);
         assert_eq!(texture.texels_across(), [4.0, 2.0]);
-        assert_eq!(Moved::new(UvSet::First, 0.0, DVec2::ZERO), None);
-        let (sin, cos) = Moved::new(UvSet::First, -270.0, DVec2::ZERO).expect("it turns").turn;
+        assert_eq!(UvTransform::new(UvSet::First, 0.0, DVec2::ZERO), None);
+        let (sin, cos) = UvTransform::new(UvSet::First, -270.0, DVec2::ZERO).expect("a rotation").turn;
         assert_eq!((sin, cos), (1.0, 0.0));
     }
 
     #[test]
-    fn the_second_set_counts_where_the_texture_asks_for_it_and_the_object_has_it() {
-        let second = SecondPoint {
+    fn second_uv_set_is_used_if_present() {
+        let second = SecondUvPoint {
             uv: DVec2::new(0.9, 0.9),
             footprint: Footprint::POINT,
             tangents: [Vec3::Y * 2.0, Vec3::NEG_X],
@@ -626,19 +626,19 @@ mod tests {
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         let first = [Vec3::X, Vec3::Y];
         assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (0.0, first));
-        texture.moved = Moved::new(UvSet::Second, 0.0, DVec2::ZERO).map(Box::new);
+        texture.moved = UvTransform::new(UvSet::Second, 0.0, DVec2::ZERO).map(Box::new);
         assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (3.0, second.tangents));
         assert_eq!(texture.lookup(&at.without_extent()).x, 3.0);
         let alone = TexturePoint { second: None, ..at };
         assert_eq!((texture.lookup(&alone).x, texture.tangents(&alone, first)), (0.0, first));
-        // It is repeated, turned and moved as the first is.
+        // The second set is repeated, rotated and translated like the first.
         texture.repeat = Vec2::new(1.0, 0.5);
-        texture.moved = Moved::new(UvSet::Second, 90.0, DVec2::new(0.5, 0.0)).map(Box::new);
+        texture.moved = UvTransform::new(UvSet::Second, 90.0, DVec2::new(0.5, 0.0)).map(Box::new);
         assert_eq!(texture.lookup(&at).x, 2.0);
     }
 
     #[test]
-    fn a_factor_multiplies_values_and_their_mean_but_no_slopes() {
+    fn factor_scales_values_and_mean_but_not_slopes() {
         let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let factor = Vec3::new(0.5, 2.0, 3.0);
         let texture = Texture { factor: Factor::new(factor), ..plain.clone() };
@@ -651,25 +651,25 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_those_of_the_moved_image() {
-        // Around the middle the numbers rise by 1 a texel across and by 2 a texel up: by 2 and 4 of the image's size.
+    fn slopes_follow_the_texture_transform() {
+        // Around the center, values increase by 1 per texel across and by 2 per texel up, i.e., by 2 and 4 per image size.
         let mut texture = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let at = |texture: &Texture, u: f64, v: f64| texture.slopes(&TexturePoint::sharp(DVec2::new(u, v)));
         assert_eq!(at(&texture, 0.5, 0.5), Vec2::new(2.0, 4.0));
         texture.repeat = Vec2::new(2.0, -3.0);
         assert_eq!(at(&texture, 0.25, -0.5), Vec2::new(4.0, -12.0));
-        // (u, v) becomes (−v, 2u): the change with u is that up the image.
+        // (u, v) maps to (−v, 2u): the slope along u is the slope up the image.
         (texture.repeat, texture.moved) =
-            (Vec2::new(2.0, 1.0), Moved::new(UvSet::First, 90.0, DVec2::new(1.0, 0.0)).map(Box::new));
+            (Vec2::new(2.0, 1.0), UvTransform::new(UvSet::First, 90.0, DVec2::new(1.0, 0.0)).map(Box::new));
         assert_eq!(at(&texture, 0.25, 0.5), Vec2::new(8.0, -2.0));
-        // Nothing is found beyond a border that goes on, and nothing in what is not finite.
+        // Clamped borders have no slope, and neither do non-finite coordinates.
         let clamped = numbered(TextureFilter::Bilinear, Wrap::Clamp);
         assert_eq!(at(&clamped, -1.0, 0.5), Vec2::new(0.0, 4.0));
         assert_eq!(at(&clamped, f64::NAN, f64::INFINITY), Vec2::ZERO);
     }
 
     #[test]
-    fn borders_and_non_finite_coordinates_stay_inside() {
+    fn extreme_coordinates_stay_inside() {
         for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
             for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
                 let texture = numbered(filter, wrap);
@@ -687,7 +687,7 @@ mod tests {
     }
 
     #[test]
-    fn look_ups_side_by_side_get_the_bits_that_each_gets_alone() {
+    fn packet_lookups_equal_single_lookups() {
         let bytes: Vec<[u8; 3]> = (0..35_u8).map(|i| [i * 7, 255 - i, i.wrapping_mul(41)]).collect();
         let floats = bytes.iter().map(|[r, g, b]| Vec3::new(f32::from(*r), f32::from(*g), f32::from(*b)));
         let images = [
@@ -710,7 +710,7 @@ mod tests {
                         [(Vec2::ONE, 0.0), (Vec2::new(2.5, -3.0), 0.0), (Vec2::new(2.0, 3.0), 25.0)]
                     {
                         let texels = Arc::clone(&texels);
-                        let moved = Moved::new(UvSet::First, degrees, DVec2::new(degrees, 0.25))
+                        let moved = UvTransform::new(UvSet::First, degrees, DVec2::new(degrees, 0.25))
                             .filter(|_| degrees != 0.0);
                         let moved = moved.map(Box::new);
                         let texture =
@@ -733,7 +733,7 @@ mod tests {
     /// The mip levels of an image.
     fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
         let halved = |level: &Texels| -> Result<Texels, ()> {
-            let halving = Halving::new(level);
+            let halving = ImageHalver::new(level);
             let mut rows = halving.start();
             (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
             Ok(halving.texels(rows))
@@ -749,7 +749,7 @@ mod tests {
     }
 
     #[test]
-    fn invisible_texels_lend_no_color() {
+    fn transparent_texels_do_not_bleed_color() {
         for data in [
             TexelData::SrgbAlpha8(vec![[255, 255, 255, 0], [0, 255, 0, 255]]),
             TexelData::LinearAlpha8(vec![[255, 0, 0, 0], [0, 255, 0, 51]]),
@@ -775,15 +775,15 @@ mod tests {
                 assert_eq!(lane(&lanes, i), alone, "{i}");
             }
         }
-        // Alpha weights, whatever it is.
+        // Partial alpha weights the colors.
         let half = TexelData::LinearAlpha8(vec![[255, 0, 0, 51], [0, 255, 0, 204]]);
         let color = row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::sharp(DVec2::new(0.5, 0.5)));
         assert!((color - Vec3::new(0.2, 0.8, 0.0)).length() < 1e-6, "{color}");
     }
 
     #[test]
-    fn a_cutoff_keeps_its_coverage_at_a_distance() {
-        // Of ten texels, four are visible, their alpha just above the cutoff.
+    fn mip_levels_preserve_the_coverage_of_a_cutoff() {
+        // Four of the ten texels are visible, with alpha just above the cutoff.
         let alphas = [140, 140, 120, 0, 0, 140, 120, 0, 140, 0].map(|alpha| [alpha; 3]);
         let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
         texture.mipmaps = levels(&texture.texels.cut(0.5));
@@ -795,11 +795,11 @@ mod tests {
             let coverage = texture.coverage(&at(u, 1e3), 0.5);
             assert!((coverage - 0.4).abs() < 1e-6, "{coverage}");
         }
-        // Nearby, it is 0 or 1.
+        // In the image itself, coverage is 0 or 1.
         for (u, expected) in [(0.05, 1.0), (0.25, 0.0), (0.35, 0.0), (0.55, 1.0)] {
             assert_eq!(texture.coverage(&at(u, 0.0), 0.5), expected, "{u}");
         }
-        // Between an image and its first level, it changes without a step.
+        // Coverage is continuous between the image and its first mip level.
         let near = [1.0 + 1e-4, 1.0].map(|texels| texture.coverage(&at(0.05, texels * 0.1), 0.5));
         assert!((near[0] - near[1]).abs() < 1e-2, "{near:?}");
     }

@@ -12,7 +12,7 @@ use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{Key, Referents};
-use crate::world::{self, Bodies, Parts, World};
+use crate::world::{self, GlassSolids, World, WorldInputs};
 
 /// A world with the key of all that its pictures depend on.
 pub(super) type Keyed = (Key, Arc<World>);
@@ -62,7 +62,7 @@ impl Eye {
 pub(super) fn world(
     scene: &Scene,
     (surfaces, of): (&Key, &Referents<'_>),
-    (built, lights, bodies): (Built, Arc<Lights>, Arc<Bodies>),
+    (built, lights, bodies): (Built, Arc<Lights>, Arc<GlassSolids>),
     textures: &Textures,
     eye: &Eye,
     memo: &mut Memo<Arc<World>>,
@@ -73,12 +73,12 @@ pub(super) fn world(
         return (key, world.clone());
     }
     let Eye { camera, orbiter } = eye.clone();
-    let parts = Parts {
+    let parts = WorldInputs {
         meshes: built.meshes,
         images: textures.images.clone(),
         orbiter,
         camera: Some(camera),
-        bodies: Some(bodies),
+        glass_solids: Some(bodies),
     };
     let world = Arc::new(World::new(scene, &parts, built.geometry, lights));
     memo.set(built_key, world.clone());

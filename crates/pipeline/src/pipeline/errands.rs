@@ -79,13 +79,13 @@ impl AtHand {
 
     fn thing(&self, place: DVec2) -> Option<Thing> {
         let (world, loaded) = (&self.world, &self.parsed.loaded);
-        let ray = world.camera.middle_ray(place);
+        let ray = world.camera.pinhole_ray(place);
         let hit = world.geometry.closest(&ray)?;
         let surface = world.geometry.surface(&ray, &hit);
         let object = loaded.scene.objects.get(hit.object as usize)?;
         let material = match object.material.map(|index| &loaded.scene.materials[index]) {
             Some(material) => format!("{} {}", material.kind.name(), material.name),
-            None => match world.own_material_name(&hit) {
+            None => match world.file_material_name(&hit) {
                 Some(name) => format!("{name}, of the file"),
                 None => "none of the file".to_owned(),
             },

@@ -21,8 +21,11 @@ pub fn shade(
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
-        let passed =
-            if tile.world.has_passable() { Some(tile.first_opaque_hit(path, hit, counters)) } else { None };
+        let passed = if tile.world.has_see_through() {
+            Some(tile.first_opaque_hit(path, hit, counters))
+        } else {
+            None
+        };
         let Some((path, hit)) = passed.unwrap_or(Some((*path, *hit))) else { continue };
         let (path, hit) = (&path, &hit);
         let vertex = Vertex::new(tile, path, hit);

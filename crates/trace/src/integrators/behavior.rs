@@ -2,7 +2,7 @@
 
 use super::settings::RenderSettings;
 use super::view::LightAov;
-use crate::lights::Receivers;
+use crate::lights::SamplingMode;
 use crate::scene::description::Method;
 
 /// What camera paths do at surfaces.
@@ -19,7 +19,7 @@ pub struct PathBehavior {
     /// mirrors and glass.
     pub gathers: bool,
     /// How lights are sampled.
-    pub receivers: Receivers,
+    pub receivers: SamplingMode,
 }
 
 impl PathBehavior {
@@ -29,12 +29,16 @@ impl PathBehavior {
         let gathers = gathers && has_photons;
         match settings.view.source().aov() {
             // The lit fraction is measured at the first visible surface, which samples all lights.
-            LightAov::LitFraction => {
-                Self { splits: true, scatters: gathers, mirrors: false, gathers, receivers: Receivers::Eye }
-            }
+            LightAov::LitFraction => Self {
+                splits: true,
+                scatters: gathers,
+                mirrors: false,
+                gathers,
+                receivers: SamplingMode::Eye,
+            },
             LightAov::Radiance(_) | LightAov::TraversalCost => {
                 let scatters = scatters || gathers;
-                let receivers = if scatters { Receivers::Paths } else { Receivers::Eye };
+                let receivers = if scatters { SamplingMode::Paths } else { SamplingMode::Eye };
                 Self { splits, scatters, mirrors: !scatters, gathers, receivers }
             }
         }
@@ -42,6 +46,6 @@ impl PathBehavior {
 }
 
 /// How lights are sampled with these settings, with or without photons.
-pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> Receivers {
+pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> SamplingMode {
     PathBehavior::of(settings, are_gathered).receivers
 }

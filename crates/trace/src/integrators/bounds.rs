@@ -59,7 +59,7 @@ pub fn draw(
 /// over smaller ones.
 fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
     let mut best: Option<BoxEdge> = None;
-    tile.world.geometry.along(ray, |local, TreeNode { bounds, depth, .. }, stretch| {
+    tile.world.geometry.visit_nodes(ray, |local, TreeNode { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| t * spread * unit;
         let RayInterval { enter, leave } = *stretch;

@@ -32,7 +32,7 @@ use crate::geometry::Ray;
 use crate::geometry::packet::{RayPacket, lanes};
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::{Bsdf, Coated, GlassPoint, Mirror, Pane, Rough, RoughBsdf};
+use crate::materials::{Bsdf, Coated, GlassPoint, Mirror, Rough, RoughBsdf, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
@@ -114,7 +114,7 @@ pub fn trace(
 /// Traversal cost of a path's ray up to its hit.
 fn traversal_cost(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
     let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
-    tile.world.geometry.work(&Ray { t_max, ..path.ray })
+    tile.world.geometry.traversal_cost(&Ray { t_max, ..path.ray })
 }
 
 /// One bounce of all paths of a batch.
@@ -163,7 +163,7 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
                         Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
                         Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
-                        Bsdf::Glass(_) | Bsdf::Pane(_) => {}
+                        Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
                     }
                 }
             }
@@ -190,7 +190,7 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
         path: &PathRay,
         vertex: &Vertex<'a>,
         hit: OpaqueHit,
-        pane: &Pane,
+        pane: &ThinDielectric,
     ) -> NullInteraction {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
@@ -293,7 +293,7 @@ impl Wavefront<'_, '_> {
         let render = &tile.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
-        let is_dark_beyond = render.background == Vec3::ZERO && !tile.world.lights.are_beyond();
+        let is_dark_beyond = render.background == Vec3::ZERO && !tile.world.lights.has_infinite_lights();
         let beyond = if is_dark_beyond { 0 } else { all & !packet.any };
         let mut wanted = packet.any & !packet.plain;
         match rays {
@@ -347,7 +347,7 @@ impl Wavefront<'_, '_> {
         let lights = &tile.world.lights;
         for lane in lanes(beyond) {
             let sky = lights.environment().map(|_| packet.sky(lane));
-            let beyond = lights.beyond_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
+            let beyond = lights.radiance_from_infinity_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
             self.accumulator.add(first + lane as u32, LocalTerm::Emitted, render.background + beyond);
         }
     }
@@ -434,7 +434,7 @@ impl Wavefront<'_, '_> {
             return;
         }
         let is_colored = self.accumulator.aov.is_colored();
-        let mut bsdf = if is_colored { rough.at(at, lookups) } else { rough.bleached() };
+        let mut bsdf = if is_colored { rough.at(at, lookups) } else { rough.with_white_textures() };
         if is_colored {
             vertex.tint(&mut bsdf);
         }
@@ -492,7 +492,7 @@ impl Wavefront<'_, '_> {
         // Without shadows, lights shine into any solid.
         let has_shadows = tile.settings.render.shadows != Shadows::Off;
         let is_dark = |interiors: &InteriorList| {
-            interiors.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body))
+            interiors.glass().is_some_and(|inside| tile.world.is_unlit_glass(inside.body))
         };
         let dark = [near, far].map(|interiors| has_shadows && is_dark(interiors));
         // Photons land on both sides, so these need a vertex each.

@@ -4,7 +4,7 @@ use super::{AovSource, FirstHit, LightAov, View};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
-use crate::world::Lookups;
+use crate::world::TextureNeeds;
 
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,28 +56,28 @@ impl RenderSettings {
     }
 
     /// The textures that images with these settings need.
-    pub fn lookups(&self) -> Lookups {
+    pub fn lookups(&self) -> TextureNeeds {
         match self.view.source() {
-            AovSource::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
-            AovSource::FirstHit(FirstHit::Albedo) => Lookups { diffuse: true, ..Lookups::NONE },
+            AovSource::FirstHit(FirstHit::Normal) => TextureNeeds { normals: true, ..TextureNeeds::NONE },
+            AovSource::FirstHit(FirstHit::Albedo) => TextureNeeds { diffuse: true, ..TextureNeeds::NONE },
             // Photons may be scattered by any surface.
-            AovSource::FirstHit(FirstHit::Photons) if self.gathers() => Lookups::ALL,
+            AovSource::FirstHit(FirstHit::Photons) if self.gathers() => TextureNeeds::ALL,
             AovSource::FirstHit(
                 FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons,
-            ) => Lookups::NONE,
+            ) => TextureNeeds::NONE,
             // Surface colors do not matter, but normals and emission do.
             AovSource::Light(LightAov::LitFraction) => {
-                Lookups { diffuse: false, specular: false, ambient: false, ..Lookups::ALL }
+                TextureNeeds { diffuse: false, specular: false, ambient: false, ..TextureNeeds::ALL }
             }
             AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
                 // These components are also visible in mirrors and through glass.
                 let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
-                Lookups { ambient, lights: parts.emitted, by_delta: true, ..Lookups::NONE }
+                TextureNeeds { ambient, lights: parts.emitted, by_delta: true, ..TextureNeeds::NONE }
             }
             // Boxes are drawn over the beauty image.
             AovSource::Light(LightAov::Radiance(_) | LightAov::TraversalCost)
             | AovSource::Bounds
-            | AovSource::Film(_) => Lookups::ALL,
+            | AovSource::Film(_) => TextureNeeds::ALL,
         }
     }
 

@@ -1,10 +1,10 @@
-//! Assembly of a world.
+//! Assembles a world from its prepared parts.
 
 use std::sync::Arc;
 
-use super::plain::PlainMaterial;
-use super::straight::Passable;
-use super::{Bodies, Camera, Geometry, ObjectMaterial, Parts, World, lower};
+use super::null_interaction::SeeThrough;
+use super::packet_material::PacketMaterial;
+use super::{Camera, Geometry, GlassSolids, ObjectMaterial, World, WorldInputs, lower};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::lights::Lights;
@@ -12,59 +12,59 @@ use crate::materials::{Material, UvSet};
 use crate::scene::description::{self, Scene};
 
 impl World {
-    /// Assembles a world from its parts.
-    pub fn new(scene: &Scene, parts: &Parts, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
-        let (materials, object_materials) = lower_materials(scene, parts);
-        let camera = parts.camera.as_ref().unwrap_or(&scene.camera);
-        let camera = Camera::new(camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
+    /// Assembles a world.
+    pub fn new(scene: &Scene, inputs: &WorldInputs, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
+        let (materials, object_materials) = lower_materials(scene, inputs);
+        let camera = inputs.camera.as_ref().unwrap_or(&scene.camera);
+        let camera = Camera::new(camera, inputs.orbiter.as_ref()).relative_to(geometry.origin());
         let is_rough = |material: &Material| material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
         let has_rough_glass = materials.iter().any(is_rough);
         let has_glass = materials.iter().any(|material| material.bsdf.glass().is_some());
-        let bodies = parts.bodies.clone().unwrap_or_else(|| Arc::new(bodies_of(scene, parts)));
+        let solids = inputs.glass_solids.clone().unwrap_or_else(|| Arc::new(find_solids(scene, inputs)));
         let world = Self {
             camera,
             geometry,
-            plain: materials.iter().map(PlainMaterial::of).collect(),
+            packet_material: materials.iter().map(PacketMaterial::of).collect(),
             has_directions: materials.iter().any(|material| material.bsdf.has_direction()),
             textured: materials.iter().map(Material::is_textured).collect(),
             mipmapped: materials.iter().map(Material::is_mipmapped).collect(),
             materials,
             object_materials,
             lights,
-            has_open_glass: bodies.has_open(),
+            has_open_glass: solids.has_open(),
             has_glass,
             has_rough_glass,
-            bodies,
-            dark_bodies: Box::default(),
-            glass_at_eye: Vec::new(),
-            bodies_at_eye: Vec::new(),
-            has_second_uvs: has_second_uvs(scene, parts),
+            glass_solids: solids,
+            unlit_glass: Box::default(),
+            lens_glass: Vec::new(),
+            camera_solids: Vec::new(),
+            has_second_uvs: has_second_uvs(scene, inputs),
             colored: colored(scene),
-            passable: None,
+            see_through: None,
         };
         Self {
-            dark_bodies: world.find_dark_bodies(),
-            glass_at_eye: world.find_glass_at_eye(),
-            bodies_at_eye: world.find_bodies_at_eye(),
-            passable: Passable::of(&world).map(Box::new),
+            unlit_glass: world.find_unlit_glass(),
+            lens_glass: world.find_lens_glass(),
+            camera_solids: world.find_camera_solids(),
+            see_through: SeeThrough::of(&world).map(Box::new),
             ..world
         }
     }
 }
 
-/// Whether a texture asks for the second set of coordinates, and a mesh has one.
-fn has_second_uvs(scene: &Scene, parts: &Parts) -> bool {
+/// Whether some texture uses the second UV set and some mesh has one.
+fn has_second_uvs(scene: &Scene, inputs: &WorldInputs) -> bool {
     let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
-    asks && parts.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
+    asks && inputs.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
 }
 
-fn bodies_of(scene: &Scene, parts: &Parts) -> Bodies {
-    let meshes: Vec<&LoadedMesh> = parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
-    // A token that nobody cancels.
-    Bodies::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
+fn find_solids(scene: &Scene, inputs: &WorldInputs) -> GlassSolids {
+    let meshes: Vec<&LoadedMesh> = inputs.meshes.iter().map(|mesh| mesh.loaded()).collect();
+    // This token is never canceled.
+    GlassSolids::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
 }
 
-/// Whether the vertex colours of each object count. `None` if those of none do.
+/// Whether each object's vertex colors are used. `None` if no object's are.
 fn colored(scene: &Scene) -> Option<Box<[bool]>> {
     let is_colored =
         |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
@@ -72,14 +72,14 @@ fn colored(scene: &Scene) -> Option<Box<[bool]>> {
     all.contains(&true).then_some(all)
 }
 
-/// The scene's materials, then each mesh file's, then the one for triangles without any.
-fn lower_materials(scene: &Scene, parts: &Parts) -> (Vec<Material>, Vec<ObjectMaterial>) {
+/// The scene's materials, then each mesh file's, then the fallback for triangles without a material.
+fn lower_materials(scene: &Scene, inputs: &WorldInputs) -> (Vec<Material>, Vec<ObjectMaterial>) {
     let mut materials: Vec<_> =
-        scene.materials.iter().map(|material| lower::material(scene, &parts.images, material)).collect();
+        scene.materials.iter().map(|material| lower::material(scene, &inputs.images, material)).collect();
     let mut first_of_file = Vec::new();
-    for mesh in &parts.meshes {
+    for mesh in &inputs.meshes {
         first_of_file.push(materials.len() as u32);
-        materials.extend(mesh.loaded().materials.iter().map(|own| lower::file_material(&parts.images, own)));
+        materials.extend(mesh.loaded().materials.iter().map(|own| lower::file_material(&inputs.images, own)));
     }
     let fallback = materials.len() as u32;
     materials.push(lower::fallback_material());

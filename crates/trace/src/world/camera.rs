@@ -7,25 +7,25 @@ use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 use crate::scene::description::{self, Pose, Viewpoint};
 
-/// A perspective camera with a flat plane of focus.
+/// A perspective camera with a planar focus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Middle of the lens.
+    /// Center of the lens.
     pub position: DVec3,
-    /// Unit axes: right and up in the picture, and forwards.
+    /// Orthonormal axes: image right, image up, and view direction.
     right: DVec3,
     up: DVec3,
     forward: DVec3,
-    /// Tangent of half the vertical angle.
+    /// Tangent of half the vertical field of view.
     tan_half_fov: f64,
-    /// Radius of the lens; 0 for a pinhole.
+    /// Lens radius; 0 for a pinhole.
     pub aperture: f64,
-    /// Distance along the axis to the plane in focus.
+    /// Distance to the plane of focus along the view axis.
     pub focus: f64,
 }
 
 impl Camera {
-    /// The camera of the scene's table, and of the orbiter file if the table names one.
+    /// Creates the camera described by the scene, with the contents of the orbiter file if it names one.
     pub fn new(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Self {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
@@ -53,7 +53,7 @@ impl Camera {
         }
     }
 
-    /// The point about which it turns, and its distance.
+    /// The point that the camera orbits, and its distance.
     pub fn aim(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> (DVec3, f64) {
         match camera {
             description::Camera::LookAt { position, look_at, .. } => (*look_at, position.distance(*look_at)),
@@ -64,8 +64,8 @@ impl Camera {
         }
     }
 
-    /// A scene's camera by vectors. An orbiter camera gets rounded numbers, near enough to look the same, and looks at the
-    /// point of its axis that is as far away as its centre.
+    /// The camera as position, target and up vector. An orbiter camera is rounded to short decimals, closely enough to look the
+    /// same; its target is the point on the view axis at the distance of its center.
     pub fn viewpoint(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Viewpoint {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => Viewpoint {
@@ -82,7 +82,7 @@ impl Camera {
                     DVec3::from_array(place.to_array().map(|at| rounded(at, decimal_step(file.size))))
                 };
                 let (position, look_at) = (short(position), short(look_at));
-                // An orbiter does not roll, so that y is up in its picture too, unless it is upside down.
+                // An orbiter does not roll: unless it is upside down, y points up in the image.
                 let is_upright = up.y > UPRIGHT;
                 let pose = Pose { position, look_at, up: if is_upright { DVec3::Y } else { up } };
                 let focus = focus.unwrap_or_else(|| pose.distance());
@@ -91,15 +91,15 @@ impl Camera {
         }
     }
 
-    /// The camera in coordinates that start elsewhere.
-    pub fn seen_from(self, origin: DVec3) -> Self {
+    /// The camera in coordinates relative to `origin`.
+    pub fn relative_to(self, origin: DVec3) -> Self {
         Self { position: self.position - origin, ..self }
     }
 
-    /// The view of a gKit orbiter: world → eye is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
+    /// The view of a gKit orbiter: world → camera is T(−p, −size)·Rx(r.x)·Ry(r.y)·T(−center).
     fn from_orbiter(orbiter: &OrbiterCamera) -> Self {
         let [x, y] = orbiter.rotation;
-        // rotation_xyz turns about x first; the orbiter turns about y first.
+        // rotation_xyz rotates about x first; the orbiter rotates about y first.
         let view: DMat3 = rotation_xyz(DVec3::new(x, 0.0, 0.0)) * rotation_xyz(DVec3::new(0.0, y, 0.0));
         let axes = view.transpose();
         let eye = DVec3::new(orbiter.position[0], orbiter.position[1], orbiter.size);
@@ -114,8 +114,8 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of the picture, given from its middle to the right and up in halves of its height, from
-    /// a point of the unit lens disk. Its direction has unit length.
+    /// The camera ray through an image point and a point on the unit lens disk. `place` is measured from the image center to the
+    /// right and up, in units of half the image height. The direction has unit length.
     #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
         let direction = self.direction(place);
@@ -125,34 +125,34 @@ impl Camera {
         Ray::new((self.position + offset).as_vec3(), aimed.normalize().as_vec3())
     }
 
-    /// [`Camera::ray`] through the middle of the lens.
+    /// [`Camera::ray`] through the center of the lens.
     #[inline(always)]
-    pub fn middle_ray(&self, place: DVec2) -> Ray {
+    pub fn pinhole_ray(&self, place: DVec2) -> Ray {
         Ray::new(self.position.as_vec3(), self.direction(place).normalize().as_vec3())
     }
 
-    /// Direction from the middle of the lens to a place, with a component of 1 along the view axis.
+    /// Unnormalized direction from the lens center through an image point; its component along the view axis is 1.
     #[inline(always)]
     fn direction(&self, place: DVec2) -> DVec3 {
         let place = place * self.tan_half_fov;
         self.forward + self.right * place.x + self.up * place.y
     }
 
-    /// Growth of a pixel's beam with the distance, in the middle of a picture of so many rows.
+    /// Width of a pixel's footprint per unit of distance, at the image center, for an image of `rows` pixel rows.
     pub fn pixel_spread(&self, rows: u32) -> f32 {
         (2.0 * self.tan_half_fov / f64::from(rows)) as f32
     }
 
-    /// Distance of a point along the view axis.
+    /// Depth of a point along the view axis.
     pub fn depth_of(&self, point: DVec3) -> f64 {
         (point - self.position).dot(self.forward)
     }
 }
 
-/// Least y of the upward axis of a camera that is not upside down, and does not look straight up or down.
+/// Minimum y of the up axis for a camera that is neither upside down nor looking straight up or down.
 const UPRIGHT: f64 = 1e-3;
 
-/// Orbiter camera in place of a missing file, which the pipeline does not allow.
+/// Used if the orbiter file is missing; the pipeline reports that as an error first.
 const DEFAULT_ORBITER: OrbiterCamera = OrbiterCamera {
     center: [0.0; 3],
     position: [0.0; 2],
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_and_the_edges_of_the_picture() {
+    fn rays_through_image_center_and_edges() {
         let camera = look_at(0.0);
         let direction = |x, y| camera.ray(DVec2::new(x, y), Vec2::ZERO).direction;
         assert!((direction(0.0, 0.0) - Vec3::NEG_Z).length() < 1e-6);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn every_point_of_the_lens_sees_the_plane_in_focus_alike() {
+    fn focal_plane_is_sharp_for_every_lens_point() {
         let camera = look_at(0.5);
         let on_plane = |lens| {
             let ray = camera.ray(DVec2::new(0.6, 0.6), lens);
@@ -204,20 +204,20 @@ mod tests {
     }
 
     #[test]
-    fn an_orbiter_looks_at_its_centre_from_its_distance() {
+    fn orbiter_looks_at_its_center_from_its_distance() {
         let orbiter =
             OrbiterCamera { center: [1.0, 2.0, 3.0], rotation: [30.0, 90.0], size: 5.0, ..DEFAULT_ORBITER };
         let camera = Camera::from_orbiter(&orbiter);
         let to_center = DVec3::new(1.0, 2.0, 3.0) - camera.position;
         assert!((to_center - camera.forward * 5.0).length() < 1e-12);
-        // Turned 90° about y the eye's axis lies along −x of the scene; 30° about x lifts it.
+        // Rotated 90° about y, the camera is on the scene's −x axis; 30° about x raises it.
         let expected = DVec3::new(-30.0_f64.to_radians().cos(), 30.0_f64.to_radians().sin(), 0.0) * 5.0;
         assert!((-to_center - expected).length() < 1e-12, "{to_center}");
         assert!(camera.up.y > 0.8);
     }
 
     #[test]
-    fn an_orbiter_by_vectors_is_the_same_camera() {
+    fn orbiter_viewpoint_is_the_same_camera() {
         let file = description::Located { value: "camera.txt".into(), span: 0..0 };
         for rotation in [[30.0, 90.0], [18.0, 16.0], [90.0, 20.0], [120.0, -7.0], [-90.0, 0.0]] {
             let orbiter = OrbiterCamera {

@@ -1,8 +1,8 @@
-//! Surfaces in contact at a point, so near to each other that no ray can decide which comes first.
+//! Coincident surfaces: surfaces so close together that a ray's hits cannot be ordered.
 //!
-//! The positions of touching surfaces are equal within rounding. A ray that hits one of them hits all surfaces within the
-//! error of the hit. It crosses them together, on the way from a point that is certainly before all of them to one that is
-//! certainly beyond. Rays that leave start at these two points, so that none is missed and none is hit again.
+//! Touching surfaces coincide within rounding. A ray that hits one of them is treated as hitting every surface within the hit's
+//! error bound. It crosses all of them at once, from a point certainly before them to one certainly beyond. New rays start at one
+//! of these two points, so that no surface is missed and none is hit twice.
 
 use super::isolated::meets;
 use super::{Geometry, Hit, MeshInstance, Object, World};
@@ -10,17 +10,17 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
 
-/// The points on both sides of surfaces that touch.
+/// Two points on either side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sides {
-    /// The point on the side from which a ray comes.
+pub struct OffsetPoints {
+    /// The point on the side that the incoming ray is on.
     pub before: Vec3,
-    /// The point on the other side.
+    /// The point on the far side.
     pub beyond: Vec3,
 }
 
-impl Sides {
-    /// The way from one to the other; t = 1 is its end.
+impl OffsetPoints {
+    /// The segment from `before` to `beyond`; it ends at t = 1.
     pub fn ray(&self) -> Ray {
         Ray { t_max: 1.0, ..Ray::new(self.before, self.beyond - self.before) }
     }
@@ -28,55 +28,55 @@ impl Sides {
 
 /// A surface or shape at or between the two points.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Near {
-    /// A shape of glass that encloses the point beyond.
+pub enum CoincidentSurface {
+    /// A glass shape that encloses the point beyond.
     Around {
         /// Its object.
         object: u32,
         /// Its material.
         material: u32,
     },
-    /// Any other surface, as the ray between the points hits it.
+    /// Any other surface that the segment between the points hits.
     Surface {
-        /// Hit of that ray.
+        /// The hit along the segment.
         hit: Hit,
         /// Its material.
         material: u32,
-        /// Whether its front, or for glass the outside of its body, is on the side of the point before.
+        /// Whether `before` is on the surface's front side, or for glass on the outside of its solid.
         is_front: bool,
     },
 }
 
-/// Memory for candidates that may be near.
+/// Reusable buffers for candidate surfaces.
 #[derive(Debug, Default)]
-pub struct NearMemory {
+pub struct ContactScratch {
     objects: Vec<u32>,
-    /// Objects and their triangles.
+    /// Pairs of object and triangle.
     triangles: Vec<(u32, u32)>,
 }
 
-/// Query for a contact.
+/// A query for coincident surfaces at a hit.
 #[derive(Clone, Copy, Debug)]
-pub struct Meeting<'a> {
-    /// The hit of one of the surfaces.
+pub struct ContactQuery<'a> {
+    /// A hit on one of the surfaces.
     pub hit: &'a Hit,
-    /// A point of that surface.
+    /// The surface at that hit.
     pub surface: &'a SurfacePoint,
-    /// Its normal on the side from which a ray comes.
+    /// The surface normal, facing the incoming ray.
     pub normal: Vec3,
-    /// Distance before it within which surfaces may have been missed: the rounding of the ray's t along the normal.
+    /// How far in front of the hit surfaces may have been missed: the rounding of the ray's t, along the normal.
     pub lead: f32,
 }
 
-/// The points before and beyond, and the one before without the lead.
+/// The two points, and the one before the surfaces if `lead` is ignored.
 #[derive(Clone, Copy)]
-struct Probe {
-    sides: Sides,
+struct ContactProbe {
+    sides: OffsetPoints,
     close: Vec3,
 }
 
-impl Probe {
-    /// Fraction of the way that is a little more than that to the close point.
+impl ContactProbe {
+    /// Slightly more than the fraction of the segment from `before` to `close`.
     fn lead_end(&self) -> f32 {
         let way = self.sides.ray().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
@@ -84,24 +84,29 @@ impl Probe {
 }
 
 impl World {
-    /// Finds the sides of all surfaces that touch at a point, and visits these in an order that depends on the scene
-    /// alone.
+    /// Finds all surfaces that coincide at a hit and the points on either side of them. `visit` is called in an order that
+    /// depends only on the scene.
     #[inline]
-    pub fn contact(&self, at: &Meeting<'_>, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
+    pub fn contact(
+        &self,
+        at: &ContactQuery<'_>,
+        memory: &mut ContactScratch,
+        visit: impl FnMut(CoincidentSurface),
+    ) -> OffsetPoints {
         let margin = self.geometry.margin(at);
         let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
             if self.is_far_side_away(at, margin) {
-                return self.contact_of_one_side(at, visit);
+                return self.single_sided_contact(at, visit);
             }
-            self.geometry.only(at, memory)
+            self.geometry.hit_candidate(at, memory)
         } else {
-            self.geometry.search(at, memory)
+            self.geometry.find_candidates(at, memory)
         };
-        self.contact_of(at, (memory, error), visit)
+        self.classify_candidates(at, (memory, error), visit)
     }
 
-    /// Whether a hit is that of a shape of glass whose other sides are far from the surfaces near the point.
-    fn is_far_side_away(&self, at: &Meeting<'_>, margin: Vec3) -> bool {
+    /// Whether the hit is on a glass shape whose other sides are far from the hit point.
+    fn is_far_side_away(&self, at: &ContactQuery<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
             Object::Shape(shape) => shape.is_far_side_beyond(at.surface.point.as_dvec3(), far),
@@ -110,40 +115,45 @@ impl World {
         is_away && self.is_glass(self.material_index(at.hit) as u32)
     }
 
-    /// [`World::contact_of`] where [`World::is_far_side_away`], with nothing else near: the side from which the ray comes decides
-    /// everything.
-    fn contact_of_one_side(&self, at: &Meeting<'_>, mut visit: impl FnMut(Near)) -> Sides {
+    /// Fast path of [`World::classify_candidates`] if [`World::is_far_side_away`] and nothing else is near: only the
+    /// side of the incoming ray matters.
+    fn single_sided_contact(
+        &self,
+        at: &ContactQuery<'_>,
+        mut visit: impl FnMut(CoincidentSurface),
+    ) -> OffsetPoints {
         let SurfacePoint { point, error, normal, .. } = *at.surface;
         let object = at.hit.object;
         if normal.dot(at.normal) > 0.0 {
-            visit(Near::Around { object, material: self.material_index(at.hit) as u32 });
+            visit(CoincidentSurface::Around { object, material: self.material_index(at.hit) as u32 });
         }
-        Sides {
+        OffsetPoints {
             before: offset_origin(point, error, at.normal, at.normal),
             beyond: offset_origin(point, error, at.normal, -at.normal),
         }
     }
 
-    /// Finds the sides among the given candidates, whose points may be in error by at most `error`.
-    pub(super) fn contact_of(
+    /// Computes the offset points and visits the coincident surfaces among the candidates in `memory`, whose error is at most
+    /// `error`.
+    pub(super) fn classify_candidates(
         &self,
-        at: &Meeting<'_>,
-        (memory, error): (&NearMemory, Vec3),
-        mut visit: impl FnMut(Near),
-    ) -> Sides {
+        at: &ContactQuery<'_>,
+        (memory, error): (&ContactScratch, Vec3),
+        mut visit: impl FnMut(CoincidentSurface),
+    ) -> OffsetPoints {
         let geometry = &self.geometry;
         let (point, normal) = (at.surface.point, at.normal);
-        let sides = Sides {
+        let sides = OffsetPoints {
             before: offset_origin(point, error + normal.abs() * at.lead, normal, normal),
             beyond: offset_origin(point, error, normal, -normal),
         };
-        let probe = Probe { sides, close: offset_origin(point, error, normal, normal) };
+        let probe = ContactProbe { sides, close: offset_origin(point, error, normal, normal) };
         let lead_end = probe.lead_end();
         let mut is_led = false;
-        let mut found = |near: Near| {
+        let mut found = |near: CoincidentSurface| {
             is_led |= match near {
-                Near::Around { .. } => false,
-                Near::Surface { hit, .. } => hit.shape.t <= lead_end,
+                CoincidentSurface::Around { .. } => false,
+                CoincidentSurface::Surface { hit, .. } => hit.shape.t <= lead_end,
             };
             visit(near);
         };
@@ -160,24 +170,25 @@ impl World {
         let ends = [sides.before, sides.beyond].map(|end| end.as_dvec3());
         for &(object, triangle) in &memory.triangles {
             let mesh = geometry.objects()[object as usize].mesh();
-            if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.crossed(triangle, ends)) {
+            if let Some((shape, is_front)) = mesh.and_then(|mesh| mesh.intersect_segment(triangle, ends)) {
                 let hit = Hit { shape, object };
                 found(self.surface_near(hit, self.material_index(&hit) as u32, is_front));
             }
         }
-        if is_led || closed_lead { sides } else { Sides { before: probe.close, ..sides } }
+        if is_led || closed_lead { sides } else { OffsetPoints { before: probe.close, ..sides } }
     }
 
-    /// A shape between the sides, or around the point beyond, if that is known of it.
+    /// Returns the shape if it is between the points, or if it is glass and encloses the point beyond. `is_around` is `None` for
+    /// open shapes.
     fn near_shape(
         &self,
         shape: &Shape,
         object: u32,
-        (sides, is_around): (&Sides, Option<bool>),
-    ) -> Option<Near> {
+        (sides, is_around): (&OffsetPoints, Option<bool>),
+    ) -> Option<CoincidentSurface> {
         let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
         if let (true, Some(is_around)) = (self.is_glass(material), is_around) {
-            return is_around.then_some(Near::Around { object, material });
+            return is_around.then_some(CoincidentSurface::Around { object, material });
         }
         let ray = sides.ray().to_f64();
         let bare = SurfaceRequest { uv: false, shadow_point: false };
@@ -186,24 +197,24 @@ impl World {
         Some(self.surface_near(Hit { shape: own, object }, material, is_front))
     }
 
-    fn surface_near(&self, hit: Hit, material: u32, is_front: bool) -> Near {
-        let is_turned = self.is_glass(material) && self.bodies.is_turned(hit.object);
-        Near::Surface { hit, material, is_front: is_front != is_turned }
+    fn surface_near(&self, hit: Hit, material: u32, is_front: bool) -> CoincidentSurface {
+        let is_inside_out = self.is_glass(material) && self.glass_solids.is_inside_out(hit.object);
+        CoincidentSurface::Surface { hit, material, is_front: is_front != is_inside_out }
     }
 
-    /// The body of glass that an object is of, by its place in the order of the file.
+    /// The object that represents the glass solid of `object`: the solid's last object in file order.
     pub fn body(&self, object: u32) -> u32 {
-        self.bodies.place(object)
+        self.glass_solids.place(object)
     }
 
-    /// Whether any body of glass is open, so that rays cannot know whether they are inside it.
+    /// Whether any glass solid is open, so that rays may not know whether they are inside.
     pub fn has_open_glass(&self) -> bool {
         self.has_open_glass
     }
 
-    /// Whether the body of glass at a place is open.
+    /// Whether a glass solid is open.
     pub fn is_open(&self, body: u32) -> bool {
-        self.bodies.is_open(body)
+        self.glass_solids.is_open(body)
     }
 
     /// Whether a material is glass.
@@ -211,7 +222,8 @@ impl World {
         self.materials[material as usize].bsdf.glass().is_some()
     }
 
-    /// Whether an object by itself determines its inside; around other objects, rays must remember the glass.
+    /// Whether the object is a closed shape, which can decide whether a point is inside. For other objects, rays must keep track
+    /// of the glass they have entered.
     pub fn is_closed(&self, object: u32) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.is_closed(),
@@ -219,7 +231,7 @@ impl World {
         }
     }
 
-    /// The closed shapes of glass, by their objects and materials.
+    /// Closed glass shapes, with their materials.
     pub fn closed_glasses(&self) -> impl Iterator<Item = (u32, u32)> {
         (0..self.geometry.objects().len() as u32).filter_map(|id| {
             let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
@@ -227,7 +239,7 @@ impl World {
         })
     }
 
-    /// Whether an object is a shape that contains a point.
+    /// Whether an object is a closed shape that contains a point.
     pub fn encloses(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
@@ -237,16 +249,16 @@ impl World {
 }
 
 impl Geometry {
-    /// Distance within which touching surfaces are searched, in errors of the point.
+    /// Search distance for coincident surfaces, as a multiple of the point's error.
     const REACH: f32 = 16.0;
 
-    /// Distance along each axis within which surfaces that touch a point are searched.
-    pub(super) fn margin(&self, at: &Meeting<'_>) -> Vec3 {
+    /// Search distance for coincident surfaces along each axis.
+    pub(super) fn margin(&self, at: &ContactQuery<'_>) -> Vec3 {
         (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead))
     }
 
-    /// Collects the hit itself as the only candidate; returns a bound on each component's distance to it.
-    pub(super) fn only(&self, at: &Meeting<'_>, memory: &mut NearMemory) -> Vec3 {
+    /// Makes the hit itself the only candidate. Returns its error bound per axis.
+    pub(super) fn hit_candidate(&self, at: &ContactQuery<'_>, memory: &mut ContactScratch) -> Vec3 {
         let Hit { shape, object } = *at.hit;
         memory.objects.clear();
         memory.triangles.clear();
@@ -262,9 +274,9 @@ impl Geometry {
         }
     }
 
-    /// Collects the shapes and triangles of meshes that may touch a point; returns a bound on each component's distance to them.
-    pub(super) fn search(&self, at: &Meeting<'_>, memory: &mut NearMemory) -> Vec3 {
-        let NearMemory { objects, triangles } = memory;
+    /// Collects shapes and triangles that may coincide with the hit point. Returns their error bound per axis.
+    pub(super) fn find_candidates(&self, at: &ContactQuery<'_>, memory: &mut ContactScratch) -> Vec3 {
+        let ContactScratch { objects, triangles } = memory;
         objects.clear();
         triangles.clear();
         let point = at.surface.point;
@@ -281,7 +293,7 @@ impl Geometry {
                 }
             });
         }
-        // Some are visited more than once.
+        // Trees may visit a triangle more than once.
         triangles.sort_unstable();
         triangles.dedup();
         error
@@ -289,7 +301,7 @@ impl Geometry {
 }
 
 impl MeshInstance {
-    /// A box of the world in the mesh's coordinates.
+    /// Bounding box, in mesh coordinates, of a world-space box.
     pub(super) fn local_box(&self, bounds: &Aabb) -> Aabb {
         let corner = |i: usize| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { bounds.min[axis] } else { bounds.max[axis] };
@@ -298,7 +310,7 @@ impl MeshInstance {
         Aabb::around_f64((0..8).map(corner))
     }
 
-    /// Error of a triangle near a point: rounding of its corners in the file, and of ray tests there.
+    /// Error of a triangle near a point: rounding of its corners in the file, and of the ray test.
     fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
@@ -307,7 +319,7 @@ impl MeshInstance {
         of_tests + self.transform.reach(reach).as_vec3() * f32::EPSILON
     }
 
-    /// Upper bound on the error of any triangle near it.
+    /// Upper bound on the error of any triangle in the mesh.
     pub(super) fn rounding(&self) -> f32 {
         let local = self.tree.bounds();
         if local.is_empty() {
@@ -317,9 +329,9 @@ impl MeshInstance {
         (reach + self.transform.translation.abs()).max_element() as f32 * (16.0 * f32::EPSILON)
     }
 
-    /// Crossing of a triangle on the way from one point to another, and whether it is from the front; decided in `f64`.
-    /// Of triangles that share an edge, one is crossed there.
-    fn crossed(&self, triangle: u32, [from, to]: [DVec3; 2]) -> Option<(ShapeHit, bool)> {
+    /// Intersects a segment with a triangle in `f64` arithmetic; returns the hit and whether it is from the front. At a shared
+    /// edge, exactly one of the triangles is hit.
+    fn intersect_segment(&self, triangle: u32, [from, to]: [DVec3; 2]) -> Option<(ShapeHit, bool)> {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         let normal = (b - a).cross(c - a);
         let (start, end) = (normal.dot(from - a), normal.dot(to - a));
@@ -328,7 +340,7 @@ impl MeshInstance {
         }
         let direction = to - from;
         let facing = if start > 0.0 { -1.0 } else { 1.0 };
-        // The area beyond an edge: the weight of its corner but for a factor.
+        // Scaled barycentric coordinate of the corner opposite to the edge.
         let beyond = |p: DVec3, q: DVec3| {
             let weight = facing * direction.dot((p - from).cross(q - from));
             let is_own = (p.to_array() < q.to_array()) == (facing > 0.0);

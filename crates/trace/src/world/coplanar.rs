@@ -1,7 +1,8 @@
 //! Lights in the plane of other surfaces.
 //!
-//! No ray can tell which of two surfaces in one plane comes first. A light there would be hit on one path and missed on another, and the
-//! two estimates of its light would disagree. Such a light is lifted off the plane by a hair, towards the side to which it emits.
+//! For two surfaces in one plane, rounding decides which one a ray hits first. Rays from a path would hit such a light while shadow
+//! rays to it are blocked, or the reverse, and the two estimates of its contribution would disagree. Such a light is therefore moved
+//! off the plane by a tiny distance, toward the side to which it emits.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -13,25 +14,25 @@ use crate::materials::EmissionSides;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{Scene, Shape};
 
-/// Distance between a light and a plane, in units of the light's size, below which they coincide.
+/// Distance between a light and a plane, relative to the light's size, below which they coincide.
 const COINCIDENT: f64 = 1.0 / (1 << 20) as f64;
-/// The lift, in units of the size of the light and its surroundings: far above the rounding of `f32`, far below what is seen.
+/// Lift relative to the size of the light and its surroundings: far above the rounding of `f32`, far too small to be visible.
 const LIFT: f64 = 1.0 / (1 << 16) as f64;
-/// Greatest sine between the normals of coincident faces.
+/// Maximum sine of the angle between the normals of coincident faces.
 const PARALLEL: f64 = 1e-5;
-/// Most sizes of the light that count as its surroundings.
+/// Maximum size of a light's surroundings, relative to the light's size.
 const SURROUNDINGS: f64 = 16.0;
-/// Most pairs of a light and a face that are compared; in a scene with more, the others are not.
-const MOST_PAIRS: usize = 1 << 26;
+/// Maximum number of pairs of a light and a face to compare; further pairs are ignored.
+const MAX_PAIRS: usize = 1 << 26;
 
 /// A light in the plane of a surface that it overlaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coplanar {
-    /// The object that emits.
+    /// The emitting object.
     pub light: usize,
     /// The other object; the same one if both are faces of one mesh.
     pub surface: usize,
-    /// Where the light has to be moved.
+    /// Translation that moves the light off the surface.
     pub lift: DVec3,
 }
 
@@ -39,10 +40,10 @@ pub struct Coplanar {
 #[derive(Clone, Debug)]
 struct Face {
     object: usize,
-    /// Corners in counterclockwise order, seen from the front; none for an infinite plane.
+    /// Corners in counterclockwise order, seen from the front; empty for an infinite plane.
     corners: Vec<DVec3>,
     point: DVec3,
-    /// Unit normal of the front.
+    /// Unit normal on the front.
     normal: DVec3,
     emits: Option<EmissionSides>,
 }
@@ -54,7 +55,7 @@ impl Face {
         Some(Self { object: 0, corners, point: a, normal, emits: None })
     }
 
-    /// The box around the corners. `None` for an infinite plane.
+    /// Bounding box of the corners. `None` for an infinite plane.
     fn bounds(&self) -> Option<[DVec3; 2]> {
         let first = *self.corners.first()?;
         let grow = |[least, greatest]: [DVec3; 2], at: &DVec3| [least.min(*at), greatest.max(*at)];
@@ -65,7 +66,7 @@ impl Face {
         self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
     }
 
-    /// Whether it emits to the side of a normal.
+    /// Whether the face emits to the side of a normal.
     fn emits_along(&self, normal: DVec3) -> bool {
         match self.emits {
             None => false,
@@ -75,18 +76,18 @@ impl Face {
     }
 }
 
-/// The faces that emit, by their least x.
+/// Emissive faces, sorted by minimum x.
 struct Lights {
     faces: Vec<Face>,
     bounds: Vec<[DVec3; 2]>,
-    /// Greatest extent in x.
+    /// Maximum extent along x, plus a margin.
     widest: f64,
-    /// Box around all, a little larger.
+    /// Bounding box of all faces, plus a margin.
     region: [DVec3; 2],
 }
 
 impl Lights {
-    /// `None` without faces.
+    /// Sorts the faces. `None` if there are none.
     fn new(mut faces: Vec<Face>) -> Option<Self> {
         let least_x = |face: &Face| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
         faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
@@ -98,12 +99,12 @@ impl Lights {
         Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin] })
     }
 
-    /// Whether no light is near a box.
+    /// Whether no light can be near a box.
     fn are_apart_from(&self, bounds: [DVec3; 2]) -> bool {
         are_apart(bounds, self.region)
     }
 
-    /// The lights whose boxes touch that of a face. Adds the number of compared lights to `pairs`.
+    /// Lights whose bounding boxes touch a face's bounding box. Adds the number of compared lights to `pairs`.
     fn near<'a>(&'a self, face: &Face, pairs: &mut usize) -> impl Iterator<Item = &'a Face> {
         let [least, greatest] = face.bounds().unwrap_or(self.region);
         let margin = (self.region[1] - self.region[0]).max_element() * COINCIDENT;
@@ -116,8 +117,8 @@ impl Lights {
     }
 }
 
-/// Lights that lie in the plane of a surface and overlap it, in coordinates that start at `origin`. `meshes` are those of the scene's
-/// mesh files.
+/// Finds the lights that overlap a surface in the same plane. Coordinates are relative to `origin`; `meshes` are the contents of the
+/// scene's mesh files.
 pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<Coplanar> {
     let mut faces = Vec::new();
     for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
@@ -132,7 +133,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     let mut pairs = 0;
     for object in 0..scene.objects.len() {
         each_face(scene, meshes, (object, origin), Some(&lights), |face| {
-            if pairs > MOST_PAIRS {
+            if pairs > MAX_PAIRS {
                 return;
             }
             for light in lights.near(face, &mut pairs) {
@@ -145,12 +146,12 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     found.into_values().flatten().collect()
 }
 
-/// Whether two boxes, of their least and greatest coordinates, have no point in common.
+/// Whether two boxes, given as minimum and maximum corners, are disjoint.
 fn are_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
     a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
 }
 
-/// How far each object has to be moved; empty if none has.
+/// Translation of each object that moves lights off coplanar surfaces; empty if no light needs it.
 pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<DVec3> {
     let found = coplanar_lights(scene, meshes, origin);
     if found.is_empty() {
@@ -159,7 +160,7 @@ pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec
     let mut lifts = vec![DVec3::ZERO; scene.objects.len()];
     let mut directions: Vec<(usize, DVec3)> = Vec::new();
     for Coplanar { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
-        // Several surfaces in one plane lift a light once.
+        // Lift a light only once for several surfaces in one plane.
         let direction = lift.normalize_or_zero();
         directions.retain(|(other, _)| *other == light);
         if !directions.iter().any(|(_, known)| known.dot(direction) > 1.0 - PARALLEL) {
@@ -170,7 +171,7 @@ pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec
     lifts
 }
 
-/// The mesh with those of its own lights lifted that are in the plane of its other faces. `None` if there are none.
+/// The mesh with each emissive triangle that is coplanar with another of its faces moved off that face. `None` if there are none.
 pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let mesh = &loaded.mesh;
     let emits = |triangle: u32| {
@@ -190,7 +191,7 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let lights = Lights::new(all.clone().filter(|id| emits(*id)).filter_map(face).collect())?;
     let (mut found, mut pairs) = (BTreeMap::new(), 0);
     for other in all.filter(|id| !emits(*id)).filter_map(face) {
-        if pairs > MOST_PAIRS {
+        if pairs > MAX_PAIRS {
             break;
         }
         let near = lights.near(&other, &mut pairs).filter(|light| coincide(light, &other));
@@ -199,7 +200,7 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let greatest =
         |face: &Face| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
     let height = LIFT * lights.faces.iter().map(greatest).fold(0.0, f64::max);
-    // Give them vertices of their own.
+    // Give the lifted triangles separate vertices.
     let mut lifted = loaded.clone();
     let mut known = HashMap::new();
     for (triangle, normal) in &found {
@@ -215,7 +216,7 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     (!found.is_empty()).then_some(lifted)
 }
 
-/// Adds a vertex with the values of another one, elsewhere.
+/// Adds a copy of a vertex at position `at`.
 fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
     fn copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
         values.extend(values.get(vertex).copied());
@@ -229,7 +230,7 @@ fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
     (mesh.positions.len() - 1) as u32
 }
 
-/// Adds a pair of objects, with the greatest lift of their faces in one direction.
+/// Adds a pair of objects, or raises its lift in this direction to the maximum over its faces.
 fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: &Face) {
     let size = light.size();
     let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
@@ -242,14 +243,14 @@ fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: 
     }
 }
 
-/// Whether the light wins over the face on the side of its front. Of two lights, and behind a light with two sides, the lower
-/// number counts.
+/// Whether to lift the light off the face, along the light's normal. The light stays if the face emits to that side as well, or if
+/// the light is two-sided and precedes the face: the lower index then wins.
 fn is_lifted(light: &Face, face: &Face) -> bool {
     let is_first = light.emits == Some(EmissionSides::Both) && light.object < face.object;
     !is_first && !face.emits_along(light.normal)
 }
 
-/// Whether two faces are in one plane and overlap.
+/// Whether two faces are coplanar and overlap.
 fn coincide(light: &Face, face: &Face) -> bool {
     let apart = light.size() * COINCIDENT;
     let is_on_plane = |corner: &DVec3| (*corner - face.point).dot(face.normal).abs() <= apart;
@@ -269,7 +270,7 @@ fn coincide(light: &Face, face: &Face) -> bool {
     !is_separated(light, face) && !is_separated(face, light)
 }
 
-/// Whether an object may have a face that emits.
+/// Whether an object may have an emissive face.
 fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     let object = &scene.objects[object];
     match (object.material, object.shape.mesh()) {
@@ -279,7 +280,7 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     }
 }
 
-/// Visits the flat faces of an object; of a mesh, those near some lights.
+/// Visits the flat faces of an object. For a mesh, skips the faces that are not near the lights, if given.
 fn each_face(
     scene: &Scene,
     meshes: &[&LoadedMesh],
@@ -348,7 +349,7 @@ fn each_face(
     }
 }
 
-/// An octagon in a circle, counterclockwise about the normal.
+/// An octagon inscribed in a circle, counterclockwise about the normal.
 fn octagon(center: DVec3, normal: DVec3, radius: f64) -> Vec<DVec3> {
     let (x, y) = normal.normalize_or(DVec3::Y).any_orthonormal_pair();
     let half = std::f64::consts::FRAC_1_SQRT_2;

@@ -5,13 +5,13 @@ use super::*;
 use crate::control::CancelToken;
 use crate::geometry::Ray;
 use crate::geometry::mesh::TriangleMesh;
-use crate::lights::Source;
+use crate::lights::LightObject;
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 use crate::scene::description::Accel;
 use crate::world::{Geometry, MeshTree};
 
-/// A square mesh about the origin that faces up.
+/// A square mesh, centered at the origin and facing up.
 fn square() -> TriangleMesh {
     let at = |x: f32, z: f32| Vec3::new(x, 0.0, z);
     TriangleMesh {
@@ -42,7 +42,7 @@ fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
     coplanar_lights(scene, &meshes, DVec3::ZERO).into_iter().map(|pair| (pair.light, pair.surface)).collect()
 }
 
-/// Lights that face up in the plane y = 0, about the origin.
+/// Lights in the plane y = 0, at the origin and facing up.
 const LIGHTS: [&str; 5] = [
     "[[quad]]\ncorner = [-0.5, 0, 0.5]\nu = [1, 0, 0]\nv = [0, 0, -1]\nmaterial = 'l'\n",
     "[[triangle]]\na = [-0.5, 0, 0.5]\nb = [0.5, 0, 0.5]\nc = [0, 0, -0.5]\nmaterial = 'l'\n",
@@ -51,7 +51,7 @@ const LIGHTS: [&str; 5] = [
     "[[mesh]]\nfile = '../../assets/gem.off'\nmaterial = 'l'\n",
 ];
 
-/// Surfaces in the same plane, which are larger.
+/// Larger surfaces in the same plane.
 const SURFACES: [&str; 6] = [
     "[[quad]]\ncorner = [-2, 0, 2]\nu = [4, 0, 0]\nv = [0, 0, -4]\nmaterial = 'w'\n",
     "[[quad]]\ncorner = [-2, 0, 2]\nu = [0, 0, -4]\nv = [4, 0, 0]\nmaterial = 'w'\n",
@@ -62,7 +62,7 @@ const SURFACES: [&str; 6] = [
 ];
 
 #[test]
-fn a_light_in_the_plane_of_a_surface_is_found_in_any_order() {
+fn coplanar_lights_are_found_in_any_order() {
     for light in LIGHTS {
         for surface in SURFACES {
             assert_eq!(pairs(&scene(&format!("{light}{surface}"))), [(0, 1)], "{light}{surface}");
@@ -72,10 +72,10 @@ fn a_light_in_the_plane_of_a_surface_is_found_in_any_order() {
 }
 
 #[test]
-fn lights_beside_above_or_across_a_surface_stay() {
+fn other_lights_are_not_lifted() {
     let surface = SURFACES[0];
     for light in [
-        // A hair above, beside, touching at an edge, upright, and a surface that does not emit.
+        // Slightly above, next to, and touching an edge of the surface; perpendicular to it; not emissive.
         LIGHTS[0].replace("-0.5, 0, 0.5", "-0.5, 1e-4, 0.5"),
         LIGHTS[0].replace("-0.5, 0, 0.5", "2.5, 0, 0.5"),
         LIGHTS[0].replace("-0.5, 0, 0.5", "2, 0, 0.5"),
@@ -84,7 +84,7 @@ fn lights_beside_above_or_across_a_surface_stay() {
     ] {
         assert!(pairs(&scene(&format!("{surface}{light}"))).is_empty(), "{light}");
     }
-    // Two lights to one side, and a light with two sides before the surface.
+    // Two lights that face the same side, and a two-sided light that precedes the surface.
     assert!(pairs(&scene(&format!("{}{}", LIGHTS[0], LIGHTS[2]))).is_empty());
     let both = LIGHTS[0].replace("'l'", "'both'");
     assert!(pairs(&scene(&format!("{both}{surface}"))).is_empty());
@@ -92,7 +92,7 @@ fn lights_beside_above_or_across_a_surface_stay() {
 }
 
 #[test]
-fn each_light_is_compared_with_what_is_near_it() {
+fn lights_are_compared_only_with_nearby_faces() {
     let light = |x: usize| {
         let corners = [(0.0, 0.0), (0.5, 0.0), (0.5, -0.5), (0.0, -0.5)];
         let corners = corners.map(|(dx, z)| DVec3::new(x as f64 + dx, 0.0, z));
@@ -117,7 +117,7 @@ fn built(scene: &Scene, accel: Accel) -> Geometry {
 }
 
 #[test]
-fn rays_meet_the_light_first_from_its_front_and_the_surface_from_behind() {
+fn lifted_lights_are_hit_only_from_the_front() {
     let mut next = random(11);
     for (light, surface) in LIGHTS.into_iter().flat_map(|light| SURFACES.map(|surface| (light, surface))) {
         for (tables, number) in [(format!("{light}{surface}"), 0), (format!("{surface}{light}"), 1)] {
@@ -130,9 +130,9 @@ fn rays_meet_the_light_first_from_its_front_and_the_surface_from_behind() {
                     let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
                     let hit = geometry.closest(&Ray::new(from, target - from)).expect("both");
                     assert_eq!(hit.object, number, "{tables} {from}");
-                    // The surface below the light is in its shadow, and the light hides nothing of itself.
+                    // Shadow rays that ignore the light reach it: the surface below does not occlude it.
                     let shadow = Ray::segment(from, target);
-                    assert!(!geometry.occluded(&shadow, Source::Object(number)), "{tables} {from}");
+                    assert!(!geometry.occluded(&shadow, LightObject::Object(number)), "{tables} {from}");
                     let is_closed = tables.contains("box") || tables.contains("cylinder");
                     let below = Vec3::new(from.x, -from.y, from.z);
                     let hit = geometry.closest(&Ray::new(below, target - below)).expect("both");
@@ -144,7 +144,7 @@ fn rays_meet_the_light_first_from_its_front_and_the_surface_from_behind() {
 }
 
 #[test]
-fn tilted_and_distant_planes_are_no_exception() {
+fn lights_in_tilted_and_distant_planes_are_lifted() {
     let mut next = random(12);
     for round in 0..40_u32 {
         let mut vector = || DVec3::new(next().into(), next().into(), next().into());
@@ -170,7 +170,7 @@ fn tilted_and_distant_planes_are_no_exception() {
 }
 
 #[test]
-fn lights_of_a_mesh_file_are_lifted_off_its_other_faces() {
+fn mesh_file_lights_are_lifted_off_other_faces() {
     let at = |x: f32, z: f32| Vec3::new(x, 2.0, z);
     let ring = |half: f32| [at(-half, -half), at(half, -half), at(half, half), at(-half, half)];
     let quad = |first: u32| [[first, first + 1, first + 2], [first, first + 2, first + 3]];
@@ -213,7 +213,7 @@ fn lights_of_a_mesh_file_are_lifted_off_its_other_faces() {
             );
         }
     }
-    // Without a light, or with one elsewhere, the mesh stays as it is.
+    // Meshes without coplanar lights stay unchanged.
     let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
     assert!(with_lifted_lights(&dark).is_none());
     let mut below = loaded;

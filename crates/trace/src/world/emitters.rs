@@ -1,4 +1,4 @@
-//! The lights of a scene: those without extent, and the objects that emit.
+//! Builds a scene's lights: point-like and infinite ones, and one per emitting surface.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -9,68 +9,72 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::delta::{PointLight, SpotLight};
-use crate::lights::infinite::{DirectionalLight, Environment, SkyMap};
+use crate::lights::infinite::{DirectionalLight, Environment, EnvironmentMap};
 use crate::lights::{
-    AreaLight, Ball, Chart, EmissionTexture, Light, LightBounds, Lights, Patch, PhotonSource, Side,
-    area_light, back_light, sheer_light,
+    AreaLight, BoundingSphere, EmissionTexture, Light, LightBounds, Lights, PhotonSource, Side, UvChart,
+    UvTriangle, area_light, back_light, see_through_light,
 };
-use crate::lights::{Emitter, Part};
+use crate::lights::{Emitter, LightPart};
 use crate::materials::texels::Texels;
 use crate::materials::{Emission, EmissionSides, Opacity};
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
-/// The map of the environment, from the texels of its file. `None` if they are black.
-pub fn sky(texels: &Arc<Texels>) -> Option<Arc<SkyMap>> {
-    SkyMap::new(Arc::clone(texels)).map(Arc::new)
+/// The environment map's sampling tables. `None` if the image is black.
+pub fn sky(texels: &Arc<Texels>) -> Option<Arc<EnvironmentMap>> {
+    EnvironmentMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
-/// The lights of a scene with these objects: those without extent first, then the environment, then the objects that emit.
-/// A mesh is a light for each of its emitting materials. What emits from both sides is two lights. `sky` is the environment's map, if it has one.
+/// Builds all lights: delta and directional lights first, then the environment, then emitting objects. A mesh becomes one light
+/// per emitting material; two-sided emission becomes two lights. `sky` is the environment map, if any.
 ///
 /// # Errors
-/// [`Cancelled`] if the token is cancelled.
+/// [`Cancelled`] if the token is canceled.
 pub fn lights(
     scene: &Scene,
     geometry: &Geometry,
     images: &Images,
-    sky: Option<Arc<SkyMap>>,
+    sky: Option<Arc<EnvironmentMap>>,
     token: &CancelToken,
 ) -> Result<Arc<Lights>, Cancelled> {
     let points = scene.lights.iter().filter(|light| light.sends());
-    let points = points.map(|light| described(light, geometry.origin()));
+    let points = points.map(|light| delta_or_directional_light(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
-    let shining = scene.materials.iter().map(|material| {
-        let emission = lit(emission(scene, images, material));
-        Shining::new(emission, opacity(scene, images, material))
+    let emissive = scene.materials.iter().map(|material| {
+        let emission = without_black_texture(emission(scene, images, material));
+        EmissiveMaterial::new(emission, opacity(scene, images, material))
     });
-    let shining: Vec<Shining> = shining.collect();
-    let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
+    let emissive: Vec<EmissiveMaterial> = emissive.collect();
+    let environment = scene.environment.as_ref().and_then(|environment| environment_light(environment, sky));
     let mut all: Vec<Light> = points.chain(environment.map(Light::Environment)).collect();
-    for ((id, object), described) in objects {
-        let shining = described.material.map(|index| &shining[index]);
+    for ((id, object), delta_or_directional_light) in objects {
+        let emissive = delta_or_directional_light.material.map(|index| &emissive[index]);
         match object {
             Object::Shape(shape) => {
-                let lights = shining.into_iter().flat_map(|shining| shape_lights(shape, shining, id));
+                let lights = emissive.into_iter().flat_map(|emissive| shape_lights(shape, emissive, id));
                 all.extend(lights.map(Light::Area));
             }
             Object::Mesh(mesh) => {
-                all.extend(mesh_lights(id, mesh, shining, images, token)?.into_iter().map(Light::Area));
+                all.extend(mesh_lights(id, mesh, emissive, images, token)?.into_iter().map(Light::Area));
             }
         }
     }
     Ok(Arc::new(Lights::new(all, token)?))
 }
 
-/// Source of the photons of a scene with these objects. `None` if no light emits photons.
+/// The photon source for a scene. `None` if no light emits photons.
 pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonSource> {
-    let outline = |object: u32| geometry.objects().get(object as usize).map(Object::outline);
-    let balls: Vec<Ball> = geometry.objects().iter().filter_map(Object::ball).collect();
-    PhotonSource::new(lights, outline, Ball::around(&balls))
+    let emitter_geometry =
+        |object: u32| geometry.objects().get(object as usize).map(Object::emitter_geometry);
+    let balls: Vec<BoundingSphere> = geometry.objects().iter().filter_map(Object::bounding_sphere).collect();
+    PhotonSource::new(lights, emitter_geometry, BoundingSphere::around(&balls))
 }
 
-/// The environment. `None` if it is black.
-fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> Option<Environment> {
+/// The environment light. `None` if it is black.
+fn environment_light(
+    environment: &description::Environment,
+    sky: Option<Arc<EnvironmentMap>>,
+) -> Option<Environment> {
     if !environment.sends() {
         return None;
     }
@@ -81,8 +85,8 @@ fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> O
     }
 }
 
-/// A light that is not a shape, in coordinates that start at `origin`.
-fn described(light: &description::Light, origin: DVec3) -> Light {
+/// A light that is not a surface, in coordinates relative to `origin`.
+fn delta_or_directional_light(light: &description::Light, origin: DVec3) -> Light {
     let point = |light: &description::light::PointLight| {
         let description::light::PointLight { position, intensity, falloff } = *light;
         PointLight { position: position - origin, intensity, falloff }
@@ -101,26 +105,26 @@ fn described(light: &description::Light, origin: DVec3) -> Light {
     }
 }
 
-/// The emission; none if its texture is black all over.
-fn lit(emission: Emission) -> Emission {
+/// The emission, or [`Emission::NONE`] if its texture is entirely black.
+fn without_black_texture(emission: Emission) -> Emission {
     match &emission.texture {
-        Some(texture) if emission.shines() && texture.texels.is_black() => Emission::NONE,
+        Some(texture) if emission.is_emissive() && texture.texels.is_black() => Emission::NONE,
         Some(_) | None => emission,
     }
 }
 
-/// Emission of a material, as far as the material is there.
+/// Emission of a material, combined with its opacity.
 #[derive(Clone)]
-struct Shining {
-    /// The emission; the same opacity everywhere is a factor of it.
+struct EmissiveMaterial {
+    /// The emission, already scaled by a constant opacity.
     emission: Emission,
-    /// The opacity, if it differs from point to point.
+    /// The opacity, if it varies over the surface.
     opacity: Option<Opacity>,
-    /// Whether light may pass.
+    /// Whether the surface may let light pass undeflected.
     is_sheer: bool,
 }
 
-impl Shining {
+impl EmissiveMaterial {
     fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
         match opacity.as_ref().and_then(Opacity::constant) {
             Some(part) => {
@@ -131,105 +135,110 @@ impl Shining {
         }
     }
 
-    /// The sides that emit.
+    /// The emitting sides.
     fn sides(&self) -> &'static [Side] {
-        match (self.emission.shines(), self.emission.sides) {
+        match (self.emission.is_emissive(), self.emission.sides) {
             (false, _) => &[],
             (true, EmissionSides::Front) => &[Side::Front],
             (true, EmissionSides::Both) => &[Side::Front, Side::Back],
         }
     }
 
-    /// Bounds of a lamp as bright as the mean of its textures.
+    /// Scales light bounds by the mean of the emission and opacity textures.
     fn mean_of(&self, bounds: LightBounds) -> LightBounds {
         let texture = self.emission.texture.as_ref();
         let bounds = texture.map_or(bounds, |texture| bounds.times(texture.mean()));
         self.opacity.as_ref().map_or(bounds, |opacity| bounds.times(Vec3::splat(opacity.mean())))
     }
 
-    /// The factor that differs from point to point or by direction, with these texture coordinates.
-    fn texture(&self, chart: Chart) -> Option<EmissionTexture> {
+    /// The factor that varies with position or direction. `chart` maps the emitter's points to UVs.
+    fn texture(&self, chart: UvChart) -> Option<EmissionTexture> {
         let Emission { texture, coat, .. } = &self.emission;
         EmissionTexture::under_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
 
-    /// Whether anything differs from point to point, or by direction.
+    /// Whether emission varies with position or direction.
     fn is_textured(&self) -> bool {
         self.emission.texture.is_some() || self.opacity.is_some() || self.emission.coat.is_some()
     }
 }
 
-/// The lights of a shape that emits: one for each side.
-fn shape_lights(shape: &Shape, shining: &Shining, object: u32) -> impl Iterator<Item = AreaLight> {
+/// The lights of an emitting shape, one per side.
+fn shape_lights(shape: &Shape, emissive: &EmissiveMaterial, object: u32) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
-        let radiance = shining.emission.scale;
-        let light = match (shining.is_sheer, side) {
-            (true, side) => sheer_light(shape, *side, radiance, object)?,
+        let radiance = emissive.emission.scale;
+        let light = match (emissive.is_sheer, side) {
+            (true, side) => see_through_light(shape, *side, radiance, object)?,
             (false, Side::Front) => area_light(shape, radiance, object)?,
             (false, Side::Back) => back_light(shape, radiance, object)?,
         };
-        let light = AreaLight { bounds: shining.mean_of(light.bounds), ..light };
-        Some(match shining.texture(Chart::Shape(*shape)) {
+        let light = AreaLight { bounds: emissive.mean_of(light.bounds), ..light };
+        Some(match emissive.texture(UvChart::Shape(*shape)) {
             Some(texture) => light.with_texture(texture),
             None => light,
         })
     };
-    shining.sides().iter().filter_map(of_side)
+    emissive.sides().iter().filter_map(of_side)
 }
 
-/// Lights of a mesh whose triangles all have this emission. `None` stands for the emission of their own materials.
+/// The lights of a mesh. If `emissive` is `None`, its triangles have the materials of the mesh file.
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,
-    shining: Option<&Shining>,
+    emissive: Option<&EmissiveMaterial>,
     images: &Images,
     token: &CancelToken,
 ) -> Result<Vec<AreaLight>, Cancelled> {
     let loaded = mesh.tree.loaded();
-    let all: Vec<(Option<u32>, Shining)> = match shining {
-        Some(shining) => vec![(None, shining.clone())],
+    let all: Vec<(Option<u32>, EmissiveMaterial)> = match emissive {
+        Some(emissive) => vec![(None, emissive.clone())],
         None => {
-            let of_file =
-                |material| Shining::new(lit(file_emission(images, material)), file_opacity(images, material));
+            let of_file = |material| {
+                EmissiveMaterial::new(
+                    without_black_texture(file_emission(images, material)),
+                    file_opacity(images, material),
+                )
+            };
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
     let light =
-        |(own, shining, side): (Option<u32>, &Shining, Side)| -> Result<Option<AreaLight>, Cancelled> {
+        |(own, emissive, side): (Option<u32>, &EmissiveMaterial, Side)| -> Result<Option<AreaLight>, Cancelled> {
             let corners = |id| match (mesh.world_corners(id), side) {
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
             };
             let triangles = distinct(mesh, own).map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
-            let radiance = shining.emission.scale;
-            let bounds = shining.mean_of(emitter.bounds().times(radiance));
+            let radiance = emissive.emission.scale;
+            let bounds = emissive.mean_of(emitter.bounds().times(radiance));
             let patches = || {
-                let patch = |id| Patch {
+                let patch = |id| UvTriangle {
                     primitive: id,
                     corners: mesh.world_corners(id),
                     uvs: mesh.corner_uvs(id),
                     second_uvs: mesh.second_corner_uvs(id),
                 };
-                Chart::Triangles(triangles_of(mesh, own).map(patch).collect())
+                UvChart::Triangles(triangles_of(mesh, own).map(patch).collect())
             };
-            let texture = if shining.is_textured() { shining.texture(patches()).map(Box::new) } else { None };
-            let (shape, part) = (Emitter::Mesh(emitter), Part::Listed);
+            let texture = if emissive.is_textured() { emissive.texture(patches()).map(Box::new) } else { None };
+            let (shape, part) = (Emitter::Mesh(emitter), LightPart::Listed);
             Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
         };
-    let of_sides =
-        all.iter().flat_map(|(own, shining)| shining.sides().iter().map(move |&side| (*own, shining, side)));
+    let of_sides = all
+        .iter()
+        .flat_map(|(own, emissive)| emissive.sides().iter().map(move |&side| (*own, emissive, side)));
     of_sides.map(light).filter_map(Result::transpose).collect()
 }
 
-/// The triangles of one of the mesh file's own materials. `None` stands for all triangles.
+/// The triangles with one of the mesh file's materials, or all triangles for `None`.
 fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mesh = &mesh.tree.loaded().mesh;
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(is_meant)
 }
 
-/// [`triangles_of`] without those whose corners another one has in the same order: a face that a file has twice emits once.
+/// [`triangles_of`] without duplicates, which have the same corners in the same order: a face that a file repeats emits only once.
 fn distinct(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mut known = HashSet::new();
     triangles_of(mesh, own).filter(move |id| {
@@ -248,14 +257,14 @@ mod tests {
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
-    use crate::lights::{Numbers, Start};
+    use crate::lights::{PhotonNumbers, PhotonOrigin};
     use crate::math::transform::Transform;
     use crate::math::{Vec3, random};
     use crate::scene::description::Accel;
     use crate::world::MeshTree;
 
     #[test]
-    fn photons_leave_a_convex_mesh_wherever_it_stands_and_however_large_it_is() {
+    fn photons_leave_convex_meshes_of_any_scale() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
         let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let mesh = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
@@ -271,20 +280,20 @@ mod tests {
         ] {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
-            let shining = Shining::new(Emission::constant(Vec3::ONE), None);
-            let lights = mesh_lights(0, &mesh, Some(&shining), &Images::default(), &CancelToken::new())
+            let emissive = EmissiveMaterial::new(Emission::constant(Vec3::ONE), None);
+            let lights = mesh_lights(0, &mesh, Some(&emissive), &Images::default(), &CancelToken::new())
                 .expect("nobody cancels");
             let lights = lights.into_iter().map(Light::Area).collect();
             let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("nobody cancels"));
             let geometry = Geometry::build(vec![Object::Mesh(Box::new(mesh))], &token);
             let geometry = geometry.expect("nobody cancels");
-            let source = photon_source(&geometry, &lights).expect("it shines");
+            let source = photon_source(&geometry, &lights).expect("a photon source");
             let mut next = random::unit(1);
             for _ in 0..20_000 {
                 let mut pair = || [next(), next()];
-                let u = Numbers { light: pair(), aim: pair(), position: pair(), direction: pair() };
+                let u = PhotonNumbers { light: pair(), aim: pair(), position: pair(), direction: pair() };
                 let photon = source.emit(&u).expect("a photon");
-                assert!(matches!(photon.start, Start::Surface { .. }));
+                assert!(matches!(photon.start, PhotonOrigin::Surface { .. }));
                 assert_eq!(geometry.closest(&photon.ray()), None, "{scale} {at}: {photon:?}");
             }
         }

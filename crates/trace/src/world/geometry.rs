@@ -1,60 +1,60 @@
-//! All objects under one tree; infinite ones beside it.
+//! The scene's objects and the acceleration structures over them.
 
 use std::sync::Arc;
 
 use crate::accel::{Bvh, InstructionSet};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint, SurfaceRequest};
-use crate::lights::Source;
+use crate::lights::LightObject;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, Lowered, Scene};
 
 use super::coplanar::lifts;
-use super::isolated::Isolated;
+use super::isolated::IsolationCache;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 
 /// The nearest hit in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Hit on the object.
+    /// The hit within the object.
     pub shape: ShapeHit,
-    /// Number of the object.
+    /// Index of the object.
     pub object: u32,
 }
 
-/// Objects and the tree over them.
+/// All objects of a scene and the tree over them.
 #[derive(Debug)]
 pub struct Geometry {
     objects: Vec<Object>,
-    /// Origin of all coordinates, in the scene's.
+    /// Origin of the traced coordinates, in scene coordinates.
     origin: DVec3,
     tree: Bvh,
-    /// Small meshes under one tree.
-    merged: Option<Merged>,
-    /// Objects that are not in the tree.
+    /// Small meshes merged into one tree. `None` if merging is not worthwhile.
+    merged: Option<MergedTree>,
+    /// Infinite objects, which are not in the tree.
     unbounded: Vec<u32>,
-    /// Error of the triangles of any mesh, with a margin for ray tests there.
+    /// Upper bound on the position error of mesh triangles, including that of ray tests.
     mesh_rounding: f32,
-    /// Places with nothing near their surface.
-    isolated: Isolated,
-    /// How far objects are moved; empty if none is.
+    /// Cache of surface regions with nothing near them.
+    isolated: IsolationCache,
+    /// Translation of each object; empty if no object is moved.
     lifts: Vec<DVec3>,
     instructions: InstructionSet,
 }
 
-/// Small meshes under one tree, and the tree that rays visit in place of that over all objects.
+/// Small meshes in one tree, and the top-level tree that rays traverse instead of the one over all objects.
 #[derive(Debug)]
-pub(super) struct Merged {
-    /// The meshes; their number among the objects of `over` comes after those of all objects.
+pub(super) struct MergedTree {
+    /// The merged meshes. In `over` they are one object, whose id follows all real objects.
     pub(super) meshes: MergedMeshes,
-    /// The tree over them and the other objects.
+    /// The tree over the merged meshes and the remaining objects.
     pub(super) over: Bvh,
 }
 
 impl Geometry {
-    /// The objects of a scene with these trees for its mesh files, in coordinates that start at `origin`.
+    /// Builds the geometry of a scene from its objects and mesh trees, in coordinates relative to `origin`.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -73,12 +73,12 @@ impl Geometry {
         Ok(Self { origin, lifts, ..Self::build(built, token)? })
     }
 
-    /// How far objects are moved, see [`super::coplanar_lights`]; empty if none is.
+    /// Translation of each object, see [`super::coplanar_lights`]; empty if no object is moved.
     pub fn lifts(&self) -> &[DVec3] {
         &self.lifts
     }
 
-    /// Builds the tree over objects.
+    /// Builds the acceleration structures over objects.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -93,13 +93,13 @@ impl Geometry {
         let merged = merged.map(|meshes| -> Result<_, Cancelled> {
             let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
-            Ok(Merged { over: Bvh::build(&with_all, token)?, meshes })
+            Ok(MergedTree { over: Bvh::build(&with_all, token)?, meshes })
         });
         let merged = merged.transpose()?;
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
         let mesh_rounding = rounding.fold(0.0, f32::max);
         let origin = DVec3::ZERO;
-        let isolated = Isolated::new(&boxes);
+        let isolated = IsolationCache::new(&boxes);
         Ok(Self {
             objects,
             origin,
@@ -113,27 +113,27 @@ impl Geometry {
         })
     }
 
-    /// The objects, which an index names.
+    /// All objects, indexed by id.
     pub fn objects(&self) -> &[Object] {
         &self.objects
     }
 
-    /// Origin of all coordinates, in the scene's.
+    /// Origin of the traced coordinates, in scene coordinates.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// The tree over the finite objects.
+    /// The tree over all finite objects.
     pub(super) fn tree(&self) -> &Bvh {
         &self.tree
     }
 
-    /// The tree that rays visit: objects by their number, and after them the merged meshes.
+    /// The top-level tree that rays traverse: unmerged objects by id, followed by the merged meshes as one.
     pub(super) fn visited(&self) -> &Bvh {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// The merged meshes. `None` if the number from [`Geometry::visited`] is that of an object.
+    /// The merged meshes, if `id` (from [`Geometry::visited`]) denotes them. `None` if it is an object.
     #[inline(always)]
     pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
@@ -146,17 +146,23 @@ impl Geometry {
         self.merged.is_some()
     }
 
-    /// Whether an object is among the merged meshes.
+    /// Whether an object is one of the merged meshes.
     pub(super) fn is_merged(&self, object: u32) -> bool {
         self.merged.as_ref().is_some_and(|merged| merged.meshes.has(object))
     }
 
-    /// Whether a light is all of a merged object: shadow rays to it visit the trees of each mesh.
+    /// Whether a light is an entire merged mesh. Shadow rays to it use the per-mesh trees instead.
     #[inline(always)]
-    pub(super) fn is_whole_merged(&self, source: Source) -> bool {
+    pub(super) fn is_whole_merged(&self, source: LightObject) -> bool {
         match (source, &self.merged) {
-            (Source::Object(object), Some(merged)) => merged.meshes.has(object),
-            (Source::Nothing | Source::Object(_) | Source::Sheer(_) | Source::Primitive(..), _) => false,
+            (LightObject::Object(object), Some(merged)) => merged.meshes.has(object),
+            (
+                LightObject::Nothing
+                | LightObject::Object(_)
+                | LightObject::SeeThrough(_)
+                | LightObject::Primitive(..),
+                _,
+            ) => false,
         }
     }
 
@@ -170,29 +176,29 @@ impl Geometry {
         &self.unbounded
     }
 
-    /// Error of the triangles of any mesh, with a margin for ray tests there.
+    /// Upper bound on the position error of mesh triangles, including that of ray tests.
     pub(super) fn mesh_rounding(&self) -> f32 {
         self.mesh_rounding
     }
 
-    /// Places with nothing near their surface.
-    pub(super) fn isolated(&self) -> &Isolated {
+    /// Cache of surface regions with nothing near them.
+    pub(super) fn isolated(&self) -> &IsolationCache {
         &self.isolated
     }
 
-    /// The geometry, with packets traced by other instructions.
+    /// The same geometry, traced with another instruction set.
     #[cfg(test)]
     pub(super) fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions;
         self
     }
 
-    /// Instructions that trace packets.
+    /// The instruction set used to trace packets.
     pub fn instructions(&self) -> InstructionSet {
         self.instructions
     }
 
-    /// The nearest hit; of hits at one distance, the object of the lowest number.
+    /// The nearest hit; at equal distances, the lowest object id wins.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.closest_in(self.visited(), ray, |id, segment| match self.merged(id) {
             Some(merged) => {
@@ -204,13 +210,12 @@ impl Geometry {
         })
     }
 
-    /// The nearest hit of the objects for which `counts` is true; of hits at one distance, the object of the lowest
-    /// number.
+    /// The nearest hit among the objects for which `counts` returns true; at equal distances, the lowest object id wins.
     pub fn closest_of(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
         self.closest_in(&self.tree, ray, |id, segment| if counts(id) { self.hit(id, segment) } else { None })
     }
 
-    /// The nearest hit of the objects of a tree and of the infinite ones, given the hit of each within a segment.
+    /// The nearest hit among the objects of a tree and the infinite ones; `hit` intersects one of them with a ray segment.
     #[inline]
     fn closest_in(
         &self,
@@ -235,25 +240,27 @@ impl Geometry {
         best
     }
 
-    /// The nearest hit of an object.
+    /// The nearest hit on one object.
     #[inline]
     fn hit(&self, id: u32, ray: &Ray) -> Option<Hit> {
         let shape = self.objects[id as usize].closest(ray, &ray.to_f64())?;
         Some(Hit { shape, object: id })
     }
 
-    /// Whether anything but the light itself lies on the segment.
-    pub fn occluded(&self, ray: &Ray, source: Source) -> bool {
+    /// Whether anything but the light itself blocks a shadow ray.
+    pub fn occluded(&self, ray: &Ray, source: LightObject) -> bool {
         let ray_f64 = ray.to_f64();
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
-            Source::Nothing => any(id, None),
-            Source::Object(own) | Source::Sheer(own) => own != id && any(id, None),
-            Source::Primitive(own, part) => any(id, (own == id).then_some(part)),
+            LightObject::Nothing => any(id, None),
+            LightObject::Object(own) | LightObject::SeeThrough(own) => own != id && any(id, None),
+            LightObject::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
         let test = |id: u32| match (self.merged(id), source) {
-            (Some(merged), Source::Nothing | Source::Object(_) | Source::Sheer(_)) => merged.any(ray, None),
-            (Some(merged), Source::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
+            (Some(merged), LightObject::Nothing | LightObject::Object(_) | LightObject::SeeThrough(_)) => {
+                merged.any(ray, None)
+            }
+            (Some(merged), LightObject::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
             (None, _) => of_object(id),
         };
         if self.is_whole_merged(source) {
@@ -262,7 +269,7 @@ impl Geometry {
         self.unbounded.iter().any(|&id| test(id)) || self.visited().any(ray, test)
     }
 
-    /// Number of the triangle of a hit among those of all meshes, for [`Ray::start`]; [`Ray::NO_TRIANGLE`] for other shapes.
+    /// Scene-wide number of the hit triangle, for [`Ray::start`]. [`Ray::NO_TRIANGLE`] for other shapes.
     #[inline(always)]
     pub fn triangle_number(&self, hit: &Hit) -> u32 {
         match &self.objects[hit.object as usize] {
@@ -271,17 +278,17 @@ impl Geometry {
         }
     }
 
-    /// The surface at a hit of this ray.
+    /// The surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         self.requested_surface(ray, hit, SurfaceRequest::ALL)
     }
 
-    /// The requested parts of the surface at a hit of this ray.
+    /// The requested surface attributes at a hit.
     pub fn requested_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
-    /// Mean curvature at a hit, > 0 if the surface bulges to its front.
+    /// Mean curvature at a hit; positive where the surface is convex on its front side.
     pub fn curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
         match &self.objects[hit.object as usize] {
             Object::Shape(shape) => shape.curvature(hit.shape.primitive, surface.point.as_dvec3()) as f32,
@@ -289,14 +296,14 @@ impl Geometry {
         }
     }
 
-    /// The material that a mesh file gives a triangle of an object, by the file's own count.
+    /// Index of a triangle's material in its mesh file. `None` if the file assigns none.
     pub fn file_material(&self, object: u32, triangle: u32) -> Option<u32> {
         let mesh = self.objects[object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
     }
 
-    /// The vertex colour at a hit, interpolated in linear light. `None` if the mesh has none.
+    /// The vertex color at a hit, interpolated in linear space. `None` if the mesh has none.
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded().mesh;
         let corners = mesh.triangles.get(hit.shape.primitive as usize)?;
@@ -306,19 +313,19 @@ impl Geometry {
         Some(a? * (1.0 - u - v) + b? * u + c? * v)
     }
 
-    /// Texture coordinates of the second set at a hit, and the changes of the point with them. `None` without such a set.
+    /// UV and tangents (∂p/∂u, ∂p/∂v) at a hit in the second UV set. `None` without one.
     pub fn second_uv(&self, hit: &Hit) -> Option<(Vec2, [Vec3; 2])> {
-        self.objects[hit.object as usize].mesh()?.second_parametrisation(&hit.shape)
+        self.objects[hit.object as usize].mesh()?.second_parameterization(&hit.shape)
     }
 
-    /// Bytes of the objects and of the tree over them, without those of meshes.
+    /// Bytes of the objects and the trees over them, without per-mesh trees.
     pub fn own_memory_bytes(&self) -> usize {
-        let of_merged = |merged: &Merged| merged.meshes.memory_bytes() + merged.over.memory_bytes();
+        let of_merged = |merged: &MergedTree| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);
         self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
     }
 
-    /// Bytes of this tree and of each mesh's, counted once.
+    /// Bytes of all trees; each mesh tree counts once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.own_memory_bytes() - size_of_val(self.objects.as_slice());
@@ -332,8 +339,8 @@ impl Geometry {
     }
 }
 
-/// Numbers the triangles of all meshes: first those of merged ones, in the order of their common tree, then the others. Meshes for
-/// which there are no numbers get none.
+/// Assigns scene-wide triangle numbers: merged meshes first, in the order of their common tree, then the others. Meshes beyond
+/// the range of `u32` get none.
 fn number_triangles(objects: &mut [Object]) {
     let mut next = Some(0_u32);
     for of_merged in [true, false] {
@@ -374,7 +381,7 @@ mod tests {
     use crate::math::transform::Transform;
     use crate::world::merged::tests::mesh;
 
-    /// Merged meshes, meshes of few triangles, and large ones with trees of their own, some of them moved.
+    /// Merged meshes, tiny meshes, and large ones with trees of their own; some are transformed.
     fn geometry() -> Geometry {
         let trees = [mesh(1, 70), mesh(2, 8), mesh(3, 17_000), mesh(4, 40)];
         let placed = |(place, tree): (usize, usize)| {
@@ -388,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_of_all_meshes_have_different_numbers() {
+    fn triangle_numbers_are_unique_across_meshes() {
         let geometry = geometry();
         let mut seen = std::collections::HashSet::new();
         for (object, own) in (0..).zip(geometry.objects()) {
@@ -401,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_that_leave_a_triangle_out_hit_what_others_hit_from_there() {
+    fn ignoring_the_start_triangle_changes_no_hit() {
         let geometry = geometry();
         let mut next = random(5);
         let (mut started, mut hits) = (0, [0; 5]);
@@ -419,6 +426,6 @@ mod tests {
             started += 1;
             hits[hit.object as usize] += u32::from(found.is_some());
         }
-        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits by the object that the rays leave");
+        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits per object that the rays start on");
     }
 }

@@ -1,8 +1,8 @@
-//! Isolated places: parts of surfaces with nothing near them. A ray that crosses a surface there need not search for contacts.
+//! Isolated surface regions: parts of surfaces with nothing else near them, where rays need not search for coincident surfaces.
 //!
-//! The first ray that asks computes it, for a triangle of a mesh or for a cell of the box around a shape, and a byte each keeps the
-//! result. The result depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same with
-//! it as by its own search.
+//! The state of each mesh triangle, and of each grid cell around a shape, is computed on first use and cached in one byte. It
+//! depends only on the geometry, not on which ray asks first. [`World::contact`](super::World::contact) returns the same result
+//! with the cache as with a search.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -11,48 +11,47 @@ use super::{Geometry, Hit, MeshInstance, Object};
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
-/// Value before any ray has asked.
+/// Not computed yet.
 const UNKNOWN: u8 = 0;
 
-/// Value if something may be near anywhere.
+/// Something may be near anywhere in the region.
 const NEVER: u8 = u8::MAX;
 
-/// Parts of 1 in a triangle's byte: nothing is near if each barycentric coordinate is at least so many of them.
-const PARTS: f32 = 256.0;
+/// Resolution of a triangle's state: nothing is near points whose barycentric coordinates are all at least `state / STATE_STEPS`.
+const STATE_STEPS: f32 = 256.0;
 
-/// Most of these parts.
-const MOST_PARTS: f64 = 64.0;
+/// Largest state to consider.
+const MAX_STATE: f64 = 64.0;
 
-/// Distance of the isolated part of a triangle from its edges, in margins: neighbours at an angle of 30° and more are not near.
+/// Distance of a triangle's isolated part from its edges, in margins. Neighbors at angles of 30° or more are then not near.
 const FROM_EDGES: f64 = 4.0;
 
-/// Least distance, in margins, of surfaces that are not near: the box of a margin around the point, and room for the
-/// rounding of both.
-const APART: f64 = 1.9;
+/// Minimum distance, in margins, of surfaces that are not near: the box of one margin around the point, with room for rounding.
+const MIN_SEPARATION: f64 = 1.9;
 
-/// Cells along a side of the box around a shape.
+/// Grid cells along each side of a shape's bounding box.
 const CELLS: usize = 16;
 
-/// Tables of all objects.
+/// The isolation tables of all objects.
 #[derive(Debug, Default)]
-pub(super) struct Isolated {
-    /// The diagonal of the box around all finite objects.
+pub(super) struct IsolationCache {
+    /// Diagonal of the box around all finite objects.
     reach: f32,
-    tables: Vec<OnceLock<Table>>,
+    tables: Vec<OnceLock<IsolationTable>>,
 }
 
-/// Table of an object.
+/// Cached isolation states of one object.
 #[derive(Debug)]
-struct Table {
-    /// Largest margin for which the table holds.
+struct IsolationTable {
+    /// Largest margin for which the states are valid.
     margin: f32,
-    /// Corner of a shape's first cell, and cells per unit of length along each axis.
+    /// For shapes: the grid's minimum corner and its cells per unit length along each axis.
     cells: [Vec3; 2],
     states: Box<[AtomicU8]>,
 }
 
-impl Isolated {
-    /// Empty tables of the objects in these boxes.
+impl IsolationCache {
+    /// Creates empty tables for objects with these bounding boxes.
     pub fn new(boxes: &[Aabb]) -> Self {
         let all = boxes.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
         let reach = if all.is_empty() { 0.0 } else { all.extent().length() };
@@ -60,12 +59,12 @@ impl Isolated {
     }
 }
 
-impl Table {
+impl IsolationTable {
     fn new(margin: f32, cells: [Vec3; 2], count: usize) -> Self {
         Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
     }
 
-    /// A table with a cell for each place of the box around a shape.
+    /// A table with one state per grid cell of a shape's bounding box.
     fn of_cells(margin: f32, bounds: &Aabb) -> Self {
         let dense = Vec3::splat(CELLS as f32) / bounds.extent();
         // A flat box is one cell thick.
@@ -73,11 +72,11 @@ impl Table {
         Self::new(margin, [bounds.min, dense], CELLS * CELLS * CELLS)
     }
 
-    /// The cell that contains a point.
+    /// The grid cell that contains a point.
     #[inline]
-    fn cell(&self, point: Vec3) -> Cell {
+    fn cell(&self, point: Vec3) -> GridCell {
         let [start, dense] = self.cells;
-        Cell(((point - start) * dense).to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
+        GridCell(((point - start) * dense).to_array().map(|along| (along.max(0.0) as usize).min(CELLS - 1)))
     }
 
     #[inline]
@@ -93,20 +92,20 @@ impl Table {
     }
 }
 
-/// A part of a surface.
-enum Region {
-    /// A box around it, grown by the margin.
-    Cell(Aabb),
-    /// A part of a triangle.
+/// A region of a surface.
+enum SurfaceRegion {
+    /// A grid cell, expanded by the margin.
+    GridCell(Aabb),
+    /// The inner part of a triangle.
     Triangle {
         corners: [DVec3; 3],
-        /// Least distance of surfaces that are not near.
+        /// Distance up to which a surface is near.
         apart: f64,
     },
 }
 
 impl Geometry {
-    /// Whether only the object of the hit, and of a mesh only its triangle, is within a margin of a point.
+    /// Whether nothing is within `margin` of the point except the hit object, or except the hit triangle for a mesh.
     pub(super) fn is_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.isolated().tables[hit.object as usize].get_or_init(|| self.table(object));
@@ -116,64 +115,69 @@ impl Geometry {
         match object {
             Object::Mesh(mesh) => {
                 let triangle = hit.shape.primitive;
-                let find = || self.parts_from_edges(hit.object, mesh, triangle, table.margin);
+                let find = || self.triangle_state(hit.object, mesh, triangle, table.margin);
                 let state = table.state(triangle as usize, find);
-                state != NEVER && surface.barycentric.min_element() * PARTS >= f32::from(state)
+                state != NEVER && surface.barycentric.min_element() * STATE_STEPS >= f32::from(state)
             }
             Object::Shape(shape) => {
                 let cell = table.cell(surface.point);
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).grown(Vec3::splat(table.margin));
-                    if self.is_clear(&around, &Region::Cell(around), hit.object) { 1 } else { NEVER }
+                    if self.is_clear(&around, &SurfaceRegion::GridCell(around), hit.object) {
+                        1
+                    } else {
+                        NEVER
+                    }
                 };
                 table.state(cell.number(), find) != NEVER
             }
         }
     }
 
-    /// A table for an object. Rays that come from farther than four times the size of the scene have larger margins than its own.
-    fn table(&self, object: &Object) -> Table {
+    /// Creates an object's table. Its margin covers rays from up to four scene sizes away; longer ones have larger margins and do
+    /// not use the table.
+    fn table(&self, object: &Object) -> IsolationTable {
         let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.isolated().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.rounding());
-                Table::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
+                IsolationTable::new(margin, [Vec3::ZERO; 2], mesh.tree.loaded().mesh.triangles.len())
             }
             Object::Shape(shape) => match shape.bounds() {
                 Some(bounds) => {
                     let size = bounds.min.abs().max(bounds.max.abs()).max_element();
-                    Table::of_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
+                    IsolationTable::of_cells(of_rays.max(64.0 * f32::EPSILON * size), &bounds)
                 }
-                // No ray has a margin that small.
-                None => Table::new(-1.0, [Vec3::ZERO; 2], 0),
+                // Unbounded shape: no ray has a negative margin, so the table is never used.
+                None => IsolationTable::new(-1.0, [Vec3::ZERO; 2], 0),
             },
         }
     }
 
-    /// The byte of a triangle.
-    fn parts_from_edges(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
+    /// Computes the state of a triangle.
+    fn triangle_state(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
         let corners = mesh.world_corners(triangle);
         let own_corners = mesh.local_corners(triangle);
         let growth = mesh.transform.max_inverse_stretch();
         let [a, b, c] = corners;
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         let height = (b - a).cross(c - a).length() / longest;
-        let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
-        // Barycentric coordinates of at least some parts form a smaller triangle about the same middle.
+        let least = (f64::from(STATE_STEPS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
+        // Points whose barycentric coordinates all exceed a bound form a smaller triangle with the same centroid.
         let smaller = |corners: [DVec3; 3], parts: f64| {
             let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
-            corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(PARTS)))
+            corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(STATE_STEPS)))
         };
-        let apart = APART * f64::from(margin);
-        // Try a part further from the edges, for neighbours at a small angle.
-        for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MOST_PARTS) {
+        let apart = MIN_SEPARATION * f64::from(margin);
+        // Also try a part farther from the edges, in case a neighbor meets this triangle at a small angle.
+        for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MAX_STATE) {
             let inner = smaller(own_corners, parts);
             if !is_clear_of_own(mesh, triangle, inner, apart * growth) {
                 continue;
             }
             let inner = smaller(corners, parts);
-            let region = Region::Triangle { corners: inner, apart };
+            let region = SurfaceRegion::Triangle { corners: inner, apart };
             let around = Aabb::around_f64(inner).grown(Vec3::splat(2.0 * margin));
             if self.is_clear(&around, &region, object) {
                 return parts as u8;
@@ -182,8 +186,8 @@ impl Geometry {
         NEVER
     }
 
-    /// Whether no other object comes near a region; near surfaces overlap `around`.
-    fn is_clear(&self, around: &Aabb, region: &Region, own: u32) -> bool {
+    /// Whether no other object is near a region; any that is must overlap `around`.
+    fn is_clear(&self, around: &Aabb, region: &SurfaceRegion, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => shape_is_near(shape, around, region),
             Object::Mesh(mesh) => {
@@ -201,8 +205,8 @@ impl Geometry {
     }
 }
 
-/// Whether a mesh's other triangles are apart from a part of one of them by a distance, all in the mesh's coordinates: its
-/// neighbours are the most triangles near it.
+/// Whether all other triangles of the mesh are at least `apart` from a part of one triangle, in mesh coordinates. Checked first:
+/// most nearby triangles are neighbors in the same mesh.
 fn is_clear_of_own(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
     let around = Aabb::around_f64(part).grown(Vec3::splat((1.1 * apart) as f32));
     mesh.tree.triangles().meeting_while(&around, |other| {
@@ -210,8 +214,8 @@ fn is_clear_of_own(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: 
     })
 }
 
-/// Whether a shape may have a point near a region, or encloses it.
-fn shape_is_near(shape: &Shape, around: &Aabb, region: &Region) -> bool {
+/// Whether a shape may intersect a region or enclose it.
+fn shape_is_near(shape: &Shape, around: &Aabb, region: &SurfaceRegion) -> bool {
     if shape.bounds().is_some_and(|bounds| !bounds.meets(around)) {
         return false;
     }
@@ -232,15 +236,15 @@ fn shape_is_near(shape: &Shape, around: &Aabb, region: &Region) -> bool {
     if let Shape::Triangle(own) = shape {
         return region.is_near([own.a, own.b, own.c], around);
     }
-    // The boxes around the others meet.
+    // For other shapes, overlapping bounding boxes count as near.
     true
 }
 
-impl Region {
-    /// Whether a triangle may be near; one that does not overlap `around` is not.
+impl SurfaceRegion {
+    /// Whether a triangle may be near the region; it is not if it does not overlap `around`.
     fn is_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
         match self {
-            Self::Cell(cell) => meets(triangle, cell),
+            Self::GridCell(cell) => meets(triangle, cell),
             Self::Triangle { corners, apart } => {
                 Aabb::around_f64(triangle).meets(around) && !are_apart(*corners, triangle, *apart)
             }
@@ -248,16 +252,16 @@ impl Region {
     }
 }
 
-/// A cell of the box around a shape, by its indices along the axes.
-struct Cell([usize; 3]);
+/// A grid cell of a shape's bounding box, by its indices along the axes.
+struct GridCell([usize; 3]);
 
-impl Cell {
+impl GridCell {
     fn number(&self) -> usize {
         let Self([x, y, z]) = *self;
         (z * CELLS + y) * CELLS + x
     }
 
-    /// Its box, with room for the rounding of places.
+    /// Its box, expanded for rounding.
     fn bounds(&self, all: &Aabb) -> Aabb {
         let side = all.extent() / CELLS as f32;
         let min = all.min + Vec3::from(self.0.map(|along| along as f32)) * side;
@@ -265,7 +269,7 @@ impl Cell {
     }
 }
 
-/// Whether a triangle has a point in a box, within rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap Testing*, 2001).
+/// Whether a triangle intersects a box, within rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap Testing*, 2001).
 pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     if !Aabb::around_f64(corners).meets(bounds) {
         return false;
@@ -287,7 +291,7 @@ pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     !(parts(normal) || edges.into_iter().flat_map(across).any(parts))
 }
 
-/// Whether an axis separates two triangles by this distance.
+/// Whether some axis separates two triangles by more than `distance`.
 fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
     let edges = |[a, b, c]: [DVec3; 3]| [b - a, c - b, a - c];
     let (own, others) = (edges(one), edges(other));
@@ -299,7 +303,7 @@ fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
         let ([a, b], [c, d]) = (range(one, axis), range(other, axis));
         (c - b).max(a - d) > distance * axis.length()
     };
-    // The edges in the first plane separate neighbours.
+    // First try the axes that separate neighbors: the first triangle's in-plane edge normals.
     let normal = own[0].cross(own[1]);
     if own.into_iter().any(|edge| parts(edge.cross(normal))) || parts(normal) {
         return true;

@@ -1,8 +1,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::contact::{Meeting, Near, NearMemory, Sides};
-use super::super::{Geometry, Hit, Images, MeshTree, Parts, World, lights};
+use super::super::contact::{CoincidentSurface, ContactQuery, ContactScratch, OffsetPoints};
+use super::super::{Geometry, Hit, Images, MeshTree, World, WorldInputs, lights};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
@@ -14,9 +14,9 @@ fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-struct Random(u64);
+struct SceneRandom(u64);
 
-impl Random {
+impl SceneRandom {
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
@@ -27,13 +27,13 @@ impl Random {
     }
 }
 
-/// Some objects; material 0 is matte, 1 and 2 are glass.
-struct Build {
+/// A scene under construction. Material 0 is matte; 1 and 2 are glass.
+struct SceneBuilder {
     scene: Scene,
     meshes: Vec<Arc<MeshTree>>,
 }
 
-impl Build {
+impl SceneBuilder {
     fn new() -> Self {
         let text = "[camera]\nposition = [0, -9, 2]\nlook_at = [0, 0, 0]\nup = [0, 0, 1]\n\
                     [materials.a]\ntype = 'phong'\n[materials.b]\ntype = 'glass'\n\
@@ -62,11 +62,16 @@ impl Build {
         let geometry = Geometry::of_scene(&self.scene, &self.meshes, DVec3::ZERO, &token);
         let geometry = Arc::new(geometry.expect("nobody cancels"));
         let lights = lights(&self.scene, &geometry, &Images::new(), None, &token).expect("nobody cancels");
-        World::new(&self.scene, &Parts { meshes: self.meshes, ..Parts::default() }, geometry, lights)
+        World::new(
+            &self.scene,
+            &WorldInputs { meshes: self.meshes, ..WorldInputs::default() },
+            geometry,
+            lights,
+        )
     }
 }
 
-/// A box from −1 to 1 whose sides are cut into squares.
+/// The cube from −1 to 1, each face divided into `steps` × `steps` squares.
 fn block(steps: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for axis in 0..3 {
@@ -89,15 +94,15 @@ fn block(steps: u32) -> TriangleMesh {
     mesh
 }
 
-/// The block, blown up to a ball.
+/// The cube projected onto the unit sphere.
 fn ball(steps: u32) -> TriangleMesh {
     let mut mesh = block(steps);
     mesh.positions.iter_mut().for_each(|place| *place = place.normalize());
     mesh
 }
 
-/// Scenes with surfaces that touch and others that do not; with places for rays to aim at.
-fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
+/// Scenes with touching and non-touching surfaces, each with points for rays to aim at.
+fn scenes(random: &mut SceneRandom) -> Vec<(World, Vec<DVec3>)> {
     let floor = Shape::Quad { corner: v(-4.0, -4.0, -1.0), u: v(8.0, 0.0, 0.0), v: v(0.0, 8.0, 0.0) };
     let cube = |x: f64, size: f64| Shape::Box {
         center: v(x, 0.0, 0.0),
@@ -119,45 +124,45 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
     let turned = random.place() * 90.0;
     let rotated = crate::math::transform::rotation_xyz(turned);
     let scenes = vec![
-        // Blocks on a floor and side by side.
+        // Blocks on a floor, side by side.
         (
-            Build::new().shape(floor.clone(), 0).mesh(coarse.clone(), at(DVec3::ZERO), 1).mesh(
+            SceneBuilder::new().shape(floor.clone(), 0).mesh(coarse.clone(), at(DVec3::ZERO), 1).mesh(
                 coarse.clone(),
                 at(v(2.0, 0.0, 0.0)),
                 2,
             ),
             places(&coarse, DVec3::ZERO),
         ),
-        // A ball that floats, and one that touches it in a point.
+        // A floating sphere, and another that touches it in a point.
         (
-            Build::new().shape(floor.clone(), 0).mesh(fine.clone(), at(v(0.0, 0.0, 0.5)), 1).mesh(
+            SceneBuilder::new().shape(floor.clone(), 0).mesh(fine.clone(), at(v(0.0, 0.0, 0.5)), 1).mesh(
                 fine.clone(),
                 at(v(2.0, 0.0, 0.5)),
                 1,
             ),
             places(&fine, v(0.0, 0.0, 0.5)),
         ),
-        // Balls in balls, on a plane.
+        // Nested spheres on a plane.
         (
-            Build::new()
+            SceneBuilder::new()
                 .shape(plane, 0)
                 .shape(globe(DVec3::ZERO, 1.0), 1)
                 .shape(globe(v(0.3, 0.0, 0.0), 0.5), 2)
                 .shape(globe(v(-0.6, 0.0, 0.0), 0.4), 1),
             vec![v(0.0, 0.0, -1.0), v(-1.0, 0.0, 0.0), v(0.8, 0.0, 0.0)],
         ),
-        // Boxes that share a face, one of a mesh; one of another size.
+        // Boxes that share a face, one of them a mesh; and one of another size.
         (
-            Build::new()
+            SceneBuilder::new()
                 .shape(floor, 0)
                 .shape(cube(0.0, 2.0), 1)
                 .mesh(coarse.clone(), at(v(2.0, 0.0, 0.0)), 2)
                 .shape(cube(-1.7, 1.4), 1),
             corners(1.0),
         ),
-        // A turned box, a thin box, and a small box in a corner of the first.
+        // A rotated box, a thin box, and a small box in a corner of the first.
         (
-            Build::new()
+            SceneBuilder::new()
                 .shape(Shape::Box { center: DVec3::ZERO, size: v(1.2, 0.8, 1.0), rotate: turned }, 1)
                 .shape(
                     Shape::Box { center: v(0.0, 0.0, 1.5), size: v(2.0, 2.0, 1e-6), rotate: DVec3::ZERO },
@@ -183,9 +188,9 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
                 .chain([v(0.0, 0.0, 1.5), v(1.0, 0.0, 1.5)])
                 .collect(),
         ),
-        // A ball of triangles in a ball and in a room; a patch of paper on it.
+        // A triangulated sphere inside a sphere and a room, with a triangle pasted on it.
         (
-            Build::new()
+            SceneBuilder::new()
                 .shape(
                     Shape::Quad { corner: v(-3.0, -3.0, -3.0), u: v(6.0, 0.0, 0.0), v: v(0.0, 6.0, 0.0) },
                     0,
@@ -202,9 +207,9 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
                 ),
             fine.positions.iter().map(|own| rotated * own.as_dvec3()).collect(),
         ),
-        // A crease: two sheets at a small angle, and a bent one.
+        // A crease: two sheets at a small angle, and a third at a large one.
         (
-            Build::new().mesh(
+            SceneBuilder::new().mesh(
                 TriangleMesh {
                     positions: vec![
                         Vec3::ZERO,
@@ -226,13 +231,13 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
 }
 
 #[test]
-fn what_is_isolated_is_what_a_search_finds_nothing_at() {
-    let mut random = Random(1);
+fn isolated_regions_match_the_full_search() {
+    let mut random = SceneRandom(1);
     let (mut isolated, mut asked, mut touching) = (0, 0, 0);
     for (number, (world, places)) in scenes(&mut random).into_iter().enumerate() {
         for round in 0..30_000 {
-            // To a place, to a point between two, near one, or anywhere.
-            let pick = |random: &mut Random| places[(random.unit() * places.len() as f64) as usize];
+            // Aim at a target point, between two, near one, or anywhere.
+            let pick = |random: &mut SceneRandom| places[(random.unit() * places.len() as f64) as usize];
             let (one, other) = (pick(&mut random), pick(&mut random));
             let target = match round % 4 {
                 0 => one,
@@ -250,20 +255,20 @@ fn what_is_isolated_is_what_a_search_finds_nothing_at() {
             let surface = world.geometry.requested_surface(&ray, &hit, SurfaceRequest::ALL);
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
-            let at = Meeting {
+            let at = ContactQuery {
                 hit: &hit,
                 surface: &surface,
                 normal,
                 lead: hit.shape.t * f32::EPSILON * facing.abs(),
             };
-            let found = |only: bool| -> (Sides, Vec<Near>) {
-                let (mut memory, mut near) = (NearMemory::default(), Vec::new());
-                let error = if only {
-                    world.geometry.only(&at, &mut memory)
+            let found = |hit_candidate: bool| -> (OffsetPoints, Vec<CoincidentSurface>) {
+                let (mut memory, mut near) = (ContactScratch::default(), Vec::new());
+                let error = if hit_candidate {
+                    world.geometry.hit_candidate(&at, &mut memory)
                 } else {
-                    world.geometry.search(&at, &mut memory)
+                    world.geometry.find_candidates(&at, &mut memory)
                 };
-                (world.contact_of(&at, (&memory, error), |one| near.push(one)), near)
+                (world.classify_candidates(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
             let is_isolated = world.geometry.is_isolated(&hit, at.surface, world.geometry.margin(&at));
@@ -271,12 +276,11 @@ fn what_is_isolated_is_what_a_search_finds_nothing_at() {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
             let mut near = Vec::new();
-            let sides = world.contact(&at, &mut NearMemory::default(), |one| near.push(one));
+            let sides = world.contact(&at, &mut ContactScratch::default(), |one| near.push(one));
             assert_eq!((sides, near), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
-            let is_other = |near: &Near| match near {
-                Near::Around { object, .. } | Near::Surface { hit: Hit { object, .. }, .. } => {
-                    *object != hit.object
-                }
+            let is_other = |near: &CoincidentSurface| match near {
+                CoincidentSurface::Around { object, .. }
+                | CoincidentSurface::Surface { hit: Hit { object, .. }, .. } => *object != hit.object,
             };
             touching += usize::from(searched.1.iter().any(is_other));
             isolated += usize::from(is_isolated && round % 4 == 3);

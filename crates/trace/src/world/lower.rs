@@ -1,4 +1,4 @@
-//! From the description's materials and those of mesh files to materials that are ready for look-ups.
+//! Converts material descriptions, from scene and mesh files, into renderable materials.
 
 use std::sync::Arc;
 
@@ -9,17 +9,18 @@ use super::textures::{
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Color, Factor, Moved, Texture, TextureFilter, Wrap};
+use crate::materials::texture::{Color, Factor, Texture, TextureFilter, UvTransform, Wrap};
 use crate::materials::{
-    Bsdf, Bump, Coated, Emission, EmissionCoat, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap,
-    Number, Opacity, Pane, Phong, Plastic, Principled, PrincipledInputs, Relief, Rough, UvSet,
+    Bsdf, Bump, Coated, Conductor, ConductorFresnel, Dielectric, Emission, EmissionCoat, Material, Mirror,
+    NormalMap, NormalPerturbation, Number, Opacity, Phong, Plastic, Principled, PrincipledInputs, Rough,
+    ThinDielectric, UvSet,
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelNumber, Scene, TextureRole, TextureUse,
+    self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelValue, Scene, TextureRole, TextureUse,
 };
 
-/// A material of the scene file.
+/// Converts a material of the scene file.
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
     let of = Declared { scene, images, material };
     let color = |source: &ColorSource| of.color(source);
@@ -31,7 +32,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             shininess: *shininess,
             ambient: ambient.as_ref().map(color),
         })),
-        MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Even(color(reflectance))),
+        MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Constant(color(reflectance))),
         MaterialKind::Metal { fresnel, roughness, anisotropy } => {
             metal(fresnel_of(fresnel, color), number(roughness), number(anisotropy))
         }
@@ -60,9 +61,11 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             clearcoat_roughness: number(clearcoat_roughness),
         })))),
         MaterialKind::Glass { ior, tint, roughness } => {
-            Bsdf::Glass(Glass::new(*ior, *tint).with_roughness(number(roughness)))
+            Bsdf::Dielectric(Dielectric::new(*ior, *tint).with_roughness(number(roughness)))
         }
-        MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: color(tint) }),
+        MaterialKind::Pane { ior, tint } => {
+            Bsdf::ThinDielectric(ThinDielectric { ior: *ior, tint: color(tint) })
+        }
     };
     let emission = emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
@@ -73,11 +76,11 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
         texture: of.texture(bump.texture, TextureRole::Bump(bump.number())),
         scale: bump.scale,
     });
-    let relief = Relief::new(normal_map, bump);
-    Material { bsdf, emission, relief, opacity: opacity(scene, images, material) }
+    let normal_perturbation = NormalPerturbation::new(normal_map, bump);
+    Material { bsdf, emission, normal_perturbation, opacity: opacity(scene, images, material) }
 }
 
-/// Opacity of a material of the scene file. `None` if the material is there everywhere.
+/// Opacity of a material of the scene file. `None` if it is fully opaque.
 pub fn opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
     let source = &material.opacity;
     if source.is_full() {
@@ -88,7 +91,7 @@ pub fn opacity(scene: &Scene, images: &Images, material: &description::Material)
         Some((index, number)) => {
             let of = Declared { scene, images, material };
             let texture = of.texture(index, TextureRole::Opacity(number));
-            // The mip levels of a coverage have the factor in the cutoff.
+            // If mip levels preserve coverage, the cutoff already includes the factor.
             let coverage = coverage(scene, index, source.cutoff);
             let factor = texture.factor.filter(|_| coverage.is_none());
             let texture = Arc::new(Texture { factor, ..(*texture).clone() });
@@ -98,27 +101,27 @@ pub fn opacity(scene: &Scene, images: &Images, material: &description::Material)
     Some(Opacity { value, cutoff })
 }
 
-/// A metal: a mirror if it is smooth.
-fn metal(fresnel: MetalFresnel, roughness: Number, anisotropy: Number) -> Bsdf {
+/// A metal: a mirror if its roughness is 0, otherwise a microfacet conductor.
+fn metal(fresnel: ConductorFresnel, roughness: Number, anisotropy: Number) -> Bsdf {
     if roughness.constant() == Some(0.0) {
-        return Bsdf::Mirror(Mirror::Metal(fresnel));
+        return Bsdf::Mirror(Mirror::Conductor(fresnel));
     }
     let is_brushed = anisotropy.constant() != Some(0.0);
-    let metal = Metal { fresnel, roughness, anisotropy };
-    Bsdf::Rough(if is_brushed { Rough::BrushedMetal(metal) } else { Rough::Metal(metal) })
+    let metal = Conductor { fresnel, roughness, anisotropy };
+    Bsdf::Rough(if is_brushed { Rough::BrushedConductor(metal) } else { Rough::Conductor(metal) })
 }
 
-/// Plastic: if its coat is smooth, this is a δ lobe over what is left.
+/// Plastic; with roughness 0, the coat becomes a δ lobe over the diffuse base.
 fn plastic(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Bsdf {
     let is_smooth = roughness.constant() == Some(0.0);
     let base = Rough::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
     if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::Rough(base) }
 }
 
-fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> MetalFresnel {
+fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> ConductorFresnel {
     match source {
-        FresnelSource::Schlick(reflectance) => MetalFresnel::Schlick(color(reflectance)),
-        FresnelSource::Index { eta, k } => MetalFresnel::Index { eta: color(eta), k: color(k) },
+        FresnelSource::Schlick(reflectance) => ConductorFresnel::Schlick(color(reflectance)),
+        FresnelSource::Index { eta, k } => ConductorFresnel::Index { eta: color(eta), k: color(k) },
     }
 }
 
@@ -133,8 +136,9 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Kind of a material of a mesh file. Models 4, 6, 7 and 9 of the MTL format are glass, unless a texture masks them; what the extension for physically based
-/// rendering describes is principled; else models 3, 5 and 8 with a highlight are mirrors, or coats over a stronger diffuse color.
+/// Material class of a mesh file's material. MTL illumination models 4, 6, 7 and 9 are glass, unless an opacity texture masks
+/// them. Materials with the physically based MTL extension are principled. Otherwise, models 3, 5 and 8 with a specular color are
+/// mirrors, or coats over a stronger diffuse color.
 enum FileKind<'a> {
     Phong,
     Principled(&'a PhysicalMaterial),
@@ -158,7 +162,7 @@ fn kind(own: &FileMaterial) -> FileKind<'_> {
     }
 }
 
-/// Whether a mesh file's material emits.
+/// Whether a mesh file's material emits light.
 pub fn file_emits(own: &FileMaterial) -> bool {
     match kind(own) {
         FileKind::Phong | FileKind::Principled(_) => own.emission != Vec3::ZERO,
@@ -174,19 +178,19 @@ pub fn file_is_glass(own: &FileMaterial) -> bool {
     }
 }
 
-/// Index of refraction of a mesh file's material, and its transmittance per unit of length; `None` if it is not glass.
+/// Index of refraction and transmittance per unit length of a mesh file's glass. `None` for other materials.
 pub fn file_glass(own: &FileMaterial) -> Option<(f32, DVec3)> {
     file_is_glass(own).then(|| (own.ior.clamp(1.0, 10.0), DVec3::ONE))
 }
 
-/// Emission of the front side of a mesh file's material.
+/// Emission of a mesh file's material, which is one-sided.
 pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     if !file_emits(own) {
         return Emission::NONE;
     }
     match &own.emission_texture {
         None => Emission::constant(own.emission),
-        // A material whose map cannot be read does not shine all over.
+        // If the emission map could not be read, emit nothing instead of everywhere.
         Some(texture) => match file_texture(images, texture, file_color_use(own, texture)) {
             None => Emission::NONE,
             texture => Emission { texture, ..Emission::constant(own.emission) },
@@ -194,7 +198,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     }
 }
 
-/// Opacity of a mesh file's material. `None` if the material is there everywhere; glass is.
+/// Opacity of a mesh file's material. `None` if it is fully opaque or glass.
 pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     if file_is_glass(own) {
         return None;
@@ -209,35 +213,35 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     Some(Opacity { value, cutoff: 0.0 })
 }
 
-/// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
+/// Converts a material of a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
-        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(Color::Constant(own.specular.min(Vec3::ONE)))),
+        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE)))),
         (FileKind::Coated, _) => file_coated(images, own),
         (FileKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
-            Bsdf::Glass(Glass::new(ior, tint).with_roughness(Number::Constant(roughness)))
+            Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(Number::Constant(roughness)))
         }
         (FileKind::Principled(physical), _) => {
             return file_surface(images, own, file_principled(images, own, physical));
         }
         (FileKind::Phong | FileKind::Glass, _) => return file_surface(images, own, file_phong(images, own)),
     };
-    Material { bsdf, emission: Emission::NONE, relief: None, opacity: file_opacity(images, own) }
+    Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
 
-/// A rough material of a mesh file, with its emission and its normal map.
+/// A non-specular material of a mesh file, with its emission and normal map.
 fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
     let normals = own.normal_texture.as_ref().and_then(|texture| {
         let texture = file_texture(images, texture, TextureUse::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
     });
-    // Grey ones are heights, of a length that the file does not tell.
-    let normals = normals.filter(|map| !map.texture.texels.is_grey());
+    // Gray images are height maps whose scale the file does not specify: ignore them.
+    let normals = normals.filter(|map| !map.texture.texels.is_gray());
     Material {
         bsdf: Bsdf::Rough(rough),
         emission: file_emission(images, own),
-        relief: Relief::new(normals, None),
+        normal_perturbation: NormalPerturbation::new(normals, None),
         opacity: file_opacity(images, own),
     }
 }
@@ -272,7 +276,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
     })
 }
 
-/// A principled material of a mesh file. An index of refraction of 1 or less says nothing.
+/// A principled material of a mesh file. An index of refraction of 1 or less means "unspecified".
 fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> Rough {
     let number = |texture: &Option<FileTexture>, constant: f32| {
         let texture = texture.as_ref().and_then(|texture| file_texture(images, texture, FILE_NUMBER));
@@ -291,7 +295,7 @@ fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMater
     })))
 }
 
-/// The material of triangles of a mesh file that name none.
+/// The material of triangles to which a mesh file assigns none.
 pub fn fallback_material() -> Material {
     let phong = Phong {
         diffuse: Color::Constant(Vec3::splat(0.7)),
@@ -299,10 +303,15 @@ pub fn fallback_material() -> Material {
         shininess: 1.0,
         ambient: None,
     };
-    Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: Emission::NONE, relief: None, opacity: None }
+    Material {
+        bsdf: Bsdf::Rough(Rough::Phong(phong)),
+        emission: Emission::NONE,
+        normal_perturbation: None,
+        opacity: None,
+    }
 }
 
-/// A material of the scene file that looks up images.
+/// Looks up the textures of a material of the scene file.
 #[derive(Clone, Copy)]
 struct Declared<'a> {
     scene: &'a Scene,
@@ -314,14 +323,14 @@ impl Declared<'_> {
     fn color(self, source: &ColorSource) -> Color {
         match source {
             ColorSource::Constant(color) => Color::Constant(*color),
-            // All roles of colors use textures alike.
+            // All color roles use textures in the same way.
             ColorSource::Texture(index) => Color::Texture(self.texture(*index, TextureRole::Facets)),
         }
     }
 
-    /// A number; without a channel, a texture's luminance.
-    fn number(self, source: &NumberSource, role: fn(PixelNumber) -> TextureRole) -> Number {
-        match (source.constant(), source.texture(PixelNumber::Luminance)) {
+    /// A scalar parameter. If the scene names no channel of its texture, the texture's luminance.
+    fn number(self, source: &NumberSource, role: fn(PixelValue) -> TextureRole) -> Number {
+        match (source.constant(), source.texture(PixelValue::Luminance)) {
             (Some(number), _) => Number::Constant(number),
             (None, Some((texture, number))) => Number::Texture(self.texture(texture, role(number))),
             (None, None) => Number::Constant(1.0),
@@ -337,7 +346,7 @@ impl Declared<'_> {
             TextureFilter::Nearest | TextureFilter::Bilinear => None,
             TextureFilter::Mipmap => mipmaps,
         };
-        let moved = Moved::new(uv, rotate, offset.as_dvec2()).map(Box::new);
+        let moved = UvTransform::new(uv, rotate, offset.as_dvec2()).map(Box::new);
         let factor = match role.texture_use() {
             TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => Factor::new(factor),
             TextureUse::Normal => None,
@@ -346,7 +355,7 @@ impl Declared<'_> {
     }
 }
 
-/// A texture of a mesh file. `None` if it was not loaded: it is never looked up, or could not be read.
+/// A texture of a mesh file. `None` if its image was not loaded, either because it is not needed or because it could not be read.
 fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Option<Arc<Texture>> {
     let texels = images.get(&file_source(texture, used))?.texels.clone();
     let (base, gain) = texture.range;
@@ -362,12 +371,12 @@ fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Opt
         filter: TextureFilter::Bilinear,
         wrap: if texture.is_clamped { Wrap::Clamp } else { Wrap::Repeat },
         repeat: texture.repeat,
-        moved: Moved::new(UvSet::First, 0.0, texture.offset).map(Box::new),
+        moved: UvTransform::new(UvSet::First, 0.0, texture.offset).map(Box::new),
         factor,
     }))
 }
 
-/// The loaded image. A material that no object has may name textures that were not loaded: they are never looked up.
+/// The loaded image. Materials without objects may refer to images that were not loaded; those are never looked up.
 fn image(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);

@@ -1,8 +1,9 @@
-//! Small meshes under one tree: a ray that passes many of them visits one set of boxes in place of a tree of each. Packets meet few
-//! triangles without a tree, as [`TriangleList`].
+//! Small meshes merged into one tree: a ray that passes many of them traverses one tree instead of one each. If there are few
+//! triangles in total, packets test them as [`TriangleList`], without a tree.
 //!
-//! The triangles are those of the instances in the scene's coordinates, rounded there; `contact` and `along` use the trees of the
-//! meshes themselves. Hits of instances that stand as in their files keep their bits.
+//! Triangles are transformed to world coordinates and rounded there. [`contact`](super::contact) and
+//! [`Geometry::visit_nodes`](super::Geometry::visit_nodes) use the per-mesh trees. Hits on untransformed instances are bit-identical to
+//! unmerged ones.
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
@@ -14,85 +15,84 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, TRUE};
 
-/// Most triangles of a mesh that is merged: a larger one is worth its own tree, and an edit that moves it then rebuilds
-/// nothing.
-const MOST_EACH: usize = 1 << 14;
+/// Maximum triangle count of a merged mesh. A larger mesh is worth its own tree, which need not be rebuilt when it moves.
+const MAX_PER_MESH: usize = 1 << 14;
 
-/// Most triangles in all: building a tree over so many takes some 10 ms.
-const MOST_IN_ALL: usize = 1 << 17;
+/// Maximum triangle count of all merged meshes; building a tree of this size takes about 10 ms.
+const MAX_TOTAL: usize = 1 << 17;
 
-/// Most triangles that rays side by side meet without a tree.
-const MOST_FACETS: usize = triangle_list::MOST;
+/// Maximum triangle count for packets to test all triangles without a tree.
+const MAX_FACETS: usize = triangle_list::MOST;
 
-/// Least triangles that are worth being merged: fewer are as fast in rows of rays, mesh by mesh.
-const LEAST_FACETS: usize = 8;
+/// Minimum triangle count worth merging; below it, testing mesh by mesh is as fast.
+const MIN_FACETS: usize = 8;
 
-/// Largest coordinate of a merged mesh, in units of its size: further off, rounding would bend it.
-const FARTHEST: f32 = 1024.0;
+/// Maximum coordinate of a merged mesh, relative to its size; farther out, rounding would distort it.
+const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
 
-/// A triangle of the tree: its object, and its number there.
+/// Identifies a triangle of the merged tree in its object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MergedTriangle {
-    /// The object.
+    /// Object id.
     pub object: u32,
-    /// The number among the object's triangles.
+    /// Index of the triangle in the object's mesh.
     pub primitive: u32,
 }
 
-/// Instances of small meshes, under one tree.
+/// Instances of small meshes in one tree.
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
-    /// Facets, which packets meet in place of the tree. `None` if there are too many triangles.
+    /// Triangles for packets to test without the tree. `None` if there are too many.
     facets: Option<TriangleList>,
-    /// Triangles in the order of objects, so that of hits at one distance the lowest object counts.
+    /// Triangles sorted by object, so that at equal distances the lowest object id wins.
     triangles: Vec<MergedTriangle>,
-    /// The number of the first triangle of each object; [`MergedMeshes::NOT_HERE`] of the others.
+    /// Index of each object's first triangle; [`MergedMeshes::NOT_HERE`] if the object is not merged.
     first: Vec<u32>,
 }
 
 impl MergedMeshes {
-    /// Value in place of the first triangle of an object that is not merged.
+    /// Marks an object that is not merged.
     const NOT_HERE: u32 = u32::MAX;
 
-    /// Merges the small meshes among objects; `None` if that is not worth a tree.
+    /// Merges the small meshes among `objects`. Returns `None` if merging is not worthwhile.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub fn of_objects(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
-        // Choose the smallest first, up to the number of triangles that may be built again at each edit.
+        // Choose the smallest meshes first, within the budget of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
         let mut chosen: Vec<usize> = (0..objects.len()).filter(|&id| may_be_merged(&objects[id])).collect();
         chosen.sort_by_key(|&id| (count(&objects[id]), id));
         let mut total = 0;
         chosen.retain(|&id| {
             let with_it = total + count(&objects[id]);
-            let has_room = with_it <= MOST_IN_ALL;
+            let has_room = with_it <= MAX_TOTAL;
             total = if has_room { with_it } else { total };
             has_room
         });
         let Some(accel) = chosen.first().and_then(|&id| Some(objects[id].mesh()?.tree.accel())) else {
             return Ok(None);
         };
-        if total < LEAST_FACETS || chosen.len() < 2 && total > MOST_FACETS {
+        if total < MIN_FACETS || chosen.len() < 2 && total > MAX_FACETS {
             return Ok(None);
         }
-        // Few triangles are worth it only without a tree.
+        // Few triangles are worth merging only if packets can test them without a tree.
         let rounded = |&id: &usize| {
             let mesh = objects[id].mesh();
             mesh.into_iter()
                 .flat_map(|mesh| (0..mesh.triangle_count() as u32).map(|own| mesh.rounded_corners(own)))
         };
         chosen.sort_unstable();
-        let facets = if total > MOST_FACETS {
+        let facets = if total > MAX_FACETS {
             None
         } else {
             TriangleList::new(chosen.iter().flat_map(rounded).collect())
         };
-        if total <= MOST_FACETS && facets.is_none() {
+        if total <= MAX_FACETS && facets.is_none() {
             return Ok(None);
         }
-        // Number their triangles by object.
+        // Number the triangles by object.
         let mut triangles = Vec::with_capacity(total);
         let mut first = vec![Self::NOT_HERE; objects.len()];
         for &id in &chosen {
@@ -115,48 +115,49 @@ impl MergedMeshes {
         Ok(Some(Self { tree, facets, triangles, first }))
     }
 
-    /// The box around all.
+    /// Bounding box of all triangles.
     pub fn bounds(&self) -> Aabb {
         self.tree.bounds()
     }
 
-    /// The tree over the triangles.
+    /// The tree over all triangles.
     pub fn tree(&self) -> &TriangleTree {
         &self.tree
     }
 
-    /// Whether an object is in the tree.
+    /// Whether an object is merged.
     pub fn has(&self, object: u32) -> bool {
         self.first.get(object as usize).is_some_and(|&first| first != Self::NOT_HERE)
     }
 
-    /// A triangle of the tree by its number.
+    /// The triangle with a number in the tree.
     #[inline(always)]
     pub fn triangle(&self, number: u32) -> MergedTriangle {
         self.triangles[number as usize]
     }
 
-    /// The number of an object's triangle in the tree; `None` if the object is not merged.
+    /// Number of an object's triangle in the tree. `None` if the object is not merged.
     #[inline(always)]
     pub fn number(&self, object: u32, primitive: u32) -> Option<u32> {
         let first = self.first.get(object as usize).copied().filter(|&first| first != Self::NOT_HERE)?;
         Some(first + primitive)
     }
 
-    /// The nearest hit, by the number of the triangle.
+    /// The nearest hit; its primitive is a triangle number of the tree.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         self.tree.closest(ray)
     }
 
-    /// Whether the ray hits any triangle but `except`.
+    /// Whether the ray hits any triangle except `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         self.tree.any(ray, except)
     }
 
-    /// Number that no triangle has.
+    /// A number that no triangle has.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// The nearest hits of the rays in `met`, with the numbers of triangles; the others end below 0.
+    /// Finds the nearest hits of the rays in `met`; primitives are triangle numbers of the tree. Other lanes have negative
+    /// `ends`.
     #[inline(never)]
     pub fn closest_rows(
         &self,
@@ -167,14 +168,14 @@ impl MergedMeshes {
     ) {
         let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
         let size = self.bounds().extent();
-        match by.run(Nearest { facets, size, rows, met, ends, found }) {
+        match by.run(ClosestFacet { facets, size, rows, met, ends, found }) {
             Some(0) => {}
             Some(undecided) => self.closest_of_each(rows, undecided, ends, found),
             None => self.closest_by_tree(rows, met, ends, found),
         }
     }
 
-    /// The nearest hits of these rays, one by one.
+    /// Traces the rays in `these` one by one.
     #[cold]
     #[inline(never)]
     fn closest_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
@@ -196,8 +197,8 @@ impl MergedMeshes {
         }
     }
 
-    /// A bit for each ray in `met` that hits any triangle but its own of `except`; this holds a triangle's number for each
-    /// ray, or [`MergedMeshes::NO_TRIANGLE`].
+    /// Returns the mask of rays in `met` that hit any triangle other than the one they ignore: each lane's entry in `except`, or
+    /// [`MergedMeshes::NO_TRIANGLE`].
     #[inline(never)]
     pub fn any_rows(
         &self,
@@ -209,14 +210,14 @@ impl MergedMeshes {
         let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
-        match by.run(Any { facets, size, rows, met, ends, except: own }) {
+        match by.run(AnyFacet { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
             Some([hit, undecided]) => hit | self.any_of_each(rows, undecided, ends, own),
             None => self.any_by_tree(rows, met, ends, except),
         }
     }
 
-    /// A bit for each of these rays that hits any triangle but its own of `except`, one by one.
+    /// Traces the rays in `these` one by one; see [`MergedMeshes::any_rows`].
     #[cold]
     #[inline(never)]
     fn any_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, except: &[u32; PACKET_SIZE]) -> u32 {
@@ -241,20 +242,20 @@ impl MergedMeshes {
         self.tree.any_packet(&rays, ends, &own)
     }
 
-    /// Bytes that the tree takes.
+    /// Bytes of the tree and its tables.
     pub fn memory_bytes(&self) -> usize {
         let facets = self.facets.as_ref().map_or(0, TriangleList::memory_bytes);
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }
 
-/// Whether the rays in `met` start near each other, by the size of a box, and go similar ways: then they visit fewer triangles by
-/// the tree than by facets.
+/// Whether the rays in `met` start close together, relative to `size`, and have similar directions. Such rays are faster with the
+/// tree than without.
 #[inline(always)]
-fn are_alike(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
+fn are_coherent(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
     let first = met.trailing_zeros() as usize % PACKET_SIZE;
-    let near = size.element_sum() * ALIKE;
-    let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * ALIKE;
+    let near = size.element_sum() * COHERENCE;
+    let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * COHERENCE;
     let from = [0, 1, 2].map(|axis| rows.origin[axis][first]);
     let way = [0, 1, 2].map(|axis| rows.direction[axis][first]);
     let ([ox, oy, oz], [dx, dy, dz]) = (&rows.origin, &rows.direction);
@@ -267,11 +268,12 @@ fn are_alike(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
     simd.movemask(&differs) & met == 0
 }
 
-/// Greatest distance of the starts of rays, by the size of all triangles, and of their directions, by their length.
-const ALIKE: f32 = 0.125;
+/// Coherence threshold: maximum distance of ray origins relative to the size of all triangles, and of directions relative to
+/// their length.
+const COHERENCE: f32 = 0.125;
 
-/// [`TriangleList::closest`], if the rays are not alike in a box of this size.
-struct Nearest<'a> {
+/// [`TriangleList::closest`] for rays that are not coherent. Returns the lanes that need an exact test, or `None` for coherent rays.
+struct ClosestFacet<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -280,21 +282,22 @@ struct Nearest<'a> {
     found: &'a mut HitPacket,
 }
 
-impl SimdKernel for Nearest<'_> {
+impl SimdKernel for ClosestFacet<'_> {
     type Output = Option<u32>;
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<u32> {
         let Self { facets, size, rows, met, ends, found } = self;
-        if are_alike(rows, met, size, simd) {
+        if are_coherent(rows, met, size, simd) {
             return None;
         }
         Some(facets.closest(rows, (met, ends), found, simd))
     }
 }
 
-/// [`TriangleList::any`], if the rays are not alike in a box of this size.
-struct Any<'a> {
+/// [`TriangleList::any`] for rays that are not coherent. Returns the hit lanes and those that need an exact test, or `None` for
+/// coherent rays.
+struct AnyFacet<'a> {
     facets: &'a TriangleList,
     size: Vec3,
     rows: &'a RayPacket,
@@ -303,20 +306,20 @@ struct Any<'a> {
     except: &'a [u32; PACKET_SIZE],
 }
 
-impl SimdKernel for Any<'_> {
+impl SimdKernel for AnyFacet<'_> {
     type Output = Option<[u32; 2]>;
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Option<[u32; 2]> {
         let Self { facets, size, rows, met, ends, except } = self;
-        if are_alike(rows, met, size, simd) {
+        if are_coherent(rows, met, size, simd) {
             return None;
         }
         Some(facets.any(rows, (met, ends), except, simd))
     }
 }
 
-/// The rays of a packet; a lane that is not in `met` gets the first ray that is, which goes in a similar direction.
+/// The rays of a packet. Lanes outside `met` get a copy of the first ray in `met`, whose direction is likely similar.
 #[inline]
 fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
@@ -326,14 +329,14 @@ fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     rays
 }
 
-/// Whether an object is a small mesh that single precision holds in the scene's coordinates.
+/// Whether an object is a mesh small enough to merge, with world coordinates that `f32` represents well.
 fn may_be_merged(object: &Object) -> bool {
     let Some(mesh) = object.mesh() else { return false };
     let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
     let greatest = bounds.min.abs().max(bounds.max.abs()).max_element();
     let size = bounds.extent().max_element();
     let count = mesh.triangle_count();
-    (1..=MOST_EACH).contains(&count) && greatest.is_finite() && greatest <= FARTHEST * size
+    (1..=MAX_PER_MESH).contains(&count) && greatest.is_finite() && greatest <= MAX_RELATIVE_COORDINATE * size
 }
 
 #[cfg(test)]
@@ -344,14 +347,14 @@ pub(super) mod tests {
     use crate::assets::LoadedMesh;
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::ray::offset_origin;
-    use crate::lights::Source;
+    use crate::lights::LightObject;
     use crate::math::DVec3;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
     use crate::world::{Geometry, Hit, MeshTree};
 
-    /// A mesh of random triangles, some of which occur twice.
+    /// A mesh of random triangles, some of them duplicated.
     pub(in crate::world) fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
         let mut next = random(seed);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
@@ -390,9 +393,9 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn meshes_under_one_tree_are_hit_where_each_is_hit_alone() {
+    fn merged_hits_equal_unmerged_hits() {
         let trees = [mesh(1, 30), mesh(2, 50), mesh(3, 7)];
-        // The second mesh is there twice in one place: of its hits the first object counts.
+        // The second mesh occurs twice in the same place; the lower object id wins.
         let of: Vec<_> = [0, 1, 1, 2].iter().map(|&i| (&trees[i], Transform::IDENTITY)).collect();
         let geometry = geometry(objects(&of));
         let alone = objects(&of);
@@ -405,7 +408,7 @@ pub(super) mod tests {
             let expected = each.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
             let found = geometry.closest(&ray);
             assert_eq!(found, expected, "{ray:?}");
-            // Leave that triangle out: the next hit is another one's.
+            // Ignoring the hit triangle yields a hit on another one.
             if let Some(hit) = found {
                 let next = geometry.closest(&ray.leaving(geometry.triangle_number(&hit)));
                 let is_own =
@@ -416,15 +419,19 @@ pub(super) mod tests {
             hits += u32::from(found.is_some());
             let nothing = Hit { shape: ShapeHit::at(0.0), object: 3 };
             let Hit { shape, object } = found.unwrap_or(nothing);
-            for source in
-                [Source::Nothing, Source::Object(object), Source::Primitive(object, shape.primitive)]
-            {
+            for source in [
+                LightObject::Nothing,
+                LightObject::Object(object),
+                LightObject::Primitive(object, shape.primitive),
+            ] {
                 let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
-                    Source::Nothing => own.any(&ray, &ray.to_f64(), None),
-                    Source::Object(except) | Source::Sheer(except) => {
+                    LightObject::Nothing => own.any(&ray, &ray.to_f64(), None),
+                    LightObject::Object(except) | LightObject::SeeThrough(except) => {
                         id != except && own.any(&ray, &ray.to_f64(), None)
                     }
-                    Source::Primitive(of, part) => own.any(&ray, &ray.to_f64(), (id == of).then_some(part)),
+                    LightObject::Primitive(of, part) => {
+                        own.any(&ray, &ray.to_f64(), (id == of).then_some(part))
+                    }
                 });
                 assert_eq!(geometry.occluded(&ray, source), any, "{ray:?} {source:?}");
                 blocked += u32::from(any);
@@ -433,7 +440,7 @@ pub(super) mod tests {
         assert!(hits > 900 && blocked > 2000, "{hits} hits, {blocked} blocked");
     }
 
-    /// Triangles about the origin, much larger than the part of them near it.
+    /// Large triangles around the origin, of which only a small part is near it.
     fn fans() -> Arc<MeshTree> {
         let mut next = random(7);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
@@ -448,7 +455,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn rays_from_merged_meshes_do_not_meet_where_they_start() {
+    fn rays_leaving_merged_meshes_do_not_hit_again() {
         let tree = fans();
         let turned = |degrees: DVec3, at: DVec3| {
             Transform::scale_rotate_translate(DVec3::new(1.0, 3.0, 0.7), degrees, at)
@@ -478,11 +485,11 @@ pub(super) mod tests {
             }
         }
         assert!(started > 5000, "{started} rays");
-        assert_eq!(again, 0, "rays that meet the triangle that they leave, of {started}");
+        assert_eq!(again, 0, "of {started} rays hit the triangle that they left");
     }
 
     #[test]
-    fn what_is_large_far_off_or_alone_keeps_its_own_tree() {
+    fn large_distant_or_lone_meshes_are_not_merged() {
         let (small, few) = (mesh(1, 60), mesh(2, 8));
         let here = Transform::IDENTITY;
         let far = Transform::scale_rotate_translate(DVec3::splat(1e-4), DVec3::ZERO, DVec3::splat(9.0));
@@ -494,16 +501,16 @@ pub(super) mod tests {
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));
         assert_eq!(members(&[(&small, here)]), None, "alone");
-        // Few triangles are met without a tree, if there are enough, and none is a needle.
+        // A few triangles are merged without a tree if there are enough of them and none is a sliver.
         assert_eq!(members(&[(&few, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&few, here)]), Some(vec![0]));
         let (least, needles) = (mesh(5, 3), mesh(6, 8));
-        assert_eq!(members(&[(&least, here), (&few, far)]), None, "fewer than are worth it");
+        assert_eq!(members(&[(&least, here), (&few, far)]), None, "too few to be worthwhile");
         let flat = Transform::scale_rotate_translate(DVec3::new(1.0, 1e-6, 1e-6), DVec3::ZERO, DVec3::ZERO);
-        assert_eq!(members(&[(&needles, flat), (&few, here)]), None, "needles");
+        assert_eq!(members(&[(&needles, flat), (&few, here)]), None, "slivers");
         let large = mesh(3, 14_000);
         assert_eq!(members(&[(&large, here), (&small, here), (&few, here)]), Some(vec![1, 2]));
-        // The smallest are merged until there is no room.
+        // The smallest are merged until the budget is used up.
         let half = mesh(4, 13_000);
         let many: Vec<_> = (0..12).map(|i| (if i == 0 { &few } else { &half }, here)).collect();
         assert_eq!(members(&many), Some((0..9).collect()));

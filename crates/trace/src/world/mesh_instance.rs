@@ -1,11 +1,11 @@
-//! Instances of meshes.
+//! A mesh placed in the scene by a transform.
 
 use std::sync::Arc;
 
-use super::mesh_facet::{ASIDE, Facet, PlacedMesh};
-use super::mesh_rows::uv_between;
+use super::mesh_packet::uv_between;
 use super::mesh_tree::MeshTree;
-use super::placement::{Placement, Unmoved};
+use super::placement::{IdentityPlacement, MeshPlacement};
+use super::triangle_point::{EDGE_MARGIN, PlacedMesh, TrianglePoint};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::packet::{HitPacket, RayPacket, lanes};
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint, SurfaceRequest};
@@ -16,37 +16,37 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// An instance of a mesh.
 #[derive(Clone, Debug)]
 pub struct MeshInstance {
-    /// The triangles.
+    /// The shared mesh and its tree.
     pub tree: Arc<MeshTree>,
-    /// Map from the mesh's coordinates to the world's.
+    /// Mesh-to-world transform.
     pub transform: Transform,
-    /// Whether to interpolate vertex normals.
+    /// Whether vertex normals are interpolated.
     pub smooth: bool,
-    /// Whether rays find it in a tree over several meshes, in the scene's coordinates.
+    /// Whether rays find its triangles in the tree of [`MergedMeshes`](super::MergedMeshes), in world coordinates.
     pub(super) is_merged: bool,
-    /// Number of its first triangle among those of all meshes. `None` if there are more than numbers.
+    /// Scene-wide number of its first triangle. `None` if the scene has more triangles than `u32` can count.
     pub(super) first: Option<u32>,
-    /// Whether its coordinates are not the scene's.
-    pub(super) is_moved: bool,
-    /// Factor from errors of points to the least distance from edges, in the mesh's coordinates.
-    aside: f64,
+    /// Whether the transform is not the identity.
+    pub(super) is_transformed: bool,
+    /// Minimum distance from triangle edges, as a multiple of the point error, in mesh coordinates.
+    edge_margin: f64,
 }
 
 impl MeshInstance {
-    /// An instance of a mesh with its own tree.
+    /// Creates an instance with a tree of its own (not merged).
     pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
-        let aside = ASIDE * transform.max_inverse_stretch();
-        let is_moved = transform != Transform::IDENTITY;
-        Self { tree, transform, smooth, is_merged: false, first: None, is_moved, aside }
+        let edge_margin = EDGE_MARGIN * transform.max_inverse_stretch();
+        let is_transformed = transform != Transform::IDENTITY;
+        Self { tree, transform, smooth, is_merged: false, first: None, is_transformed, edge_margin }
     }
 
-    /// The ray in the mesh's coordinates, with the same t.
+    /// Transforms a ray to mesh coordinates; t stays the same.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
         let start = self.own_number(ray.start);
-        if self.is_moved { self.moved(ray).leaving(start) } else { ray.leaving(start) }
+        if self.is_transformed { self.moved(ray).leaving(start) } else { ray.leaving(start) }
     }
 
-    /// The ray in the mesh's coordinates, if the mesh is moved.
+    /// Applies the inverse transform to a ray.
     fn moved(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
@@ -55,27 +55,26 @@ impl MeshInstance {
         }
     }
 
-    /// The scene's number of a triangle, see [`Geometry::triangle_number`](super::Geometry::triangle_number).
+    /// The scene-wide number of a triangle; see [`Geometry::triangle_number`](super::Geometry::triangle_number).
     #[inline(always)]
     pub(super) fn scene_number(&self, triangle: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
     }
 
-    /// `scene_number` of the triangles of a row; any numbers for lanes without one.
+    /// Like `scene_number`, for a packet; lanes without a triangle get arbitrary numbers.
     #[inline(always)]
     pub fn scene_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
         let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET_SIZE] };
         triangles.map(|triangle| first.wrapping_add(triangle))
     }
 
-    /// The number among the mesh's triangles of the one with this number in the scene; if that is another mesh's, a number that
-    /// no triangle has.
+    /// Converts a scene-wide triangle number to this mesh's numbering. For another mesh's triangle, the result is out of range.
     #[inline(always)]
     pub(super) fn own_number(&self, in_scene: u32) -> u32 {
         self.first.map_or(Ray::NO_TRIANGLE, |first| in_scene.wrapping_sub(first))
     }
 
-    /// The box around it.
+    /// Bounding box in world coordinates.
     pub(super) fn bounds(&self) -> Aabb {
         let local = self.tree.bounds();
         if local.is_empty() {
@@ -88,32 +87,32 @@ impl MeshInstance {
         Aabb::around_f64((0..8).map(corner))
     }
 
-    /// Corners of a triangle in world coordinates, ordered so that the front is along (b − a) × (c − a).
+    /// Corners of a triangle in world coordinates, ordered so that the front side faces along (b − a) × (c − a).
     pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] }
     }
 
-    /// Corners of a triangle in the mesh's coordinates, in the order of the file.
+    /// Corners of a triangle in mesh coordinates and file order.
     pub(super) fn local_corners(&self, triangle: u32) -> [DVec3; 3] {
         self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3())
     }
 
-    /// Number of triangles of the mesh.
+    /// Number of triangles in the mesh.
     pub(super) fn triangle_count(&self) -> usize {
         self.tree.loaded().mesh.triangles.len()
     }
 
-    /// Corners of a triangle in the scene's coordinates, rounded, in the order of the file.
+    /// Corners of a triangle in world coordinates, rounded to `f32`, in file order.
     pub(super) fn rounded_corners(&self, triangle: u32) -> [Vec3; 3] {
         let corners = self.tree.loaded().mesh.corners(triangle);
-        if !self.is_moved {
+        if !self.is_transformed {
             return corners;
         }
         corners.map(|corner| self.transform.point(corner.as_dvec3()).as_vec3())
     }
 
-    /// Texture coordinates of the vertices by a set; those of the first if there is no second.
+    /// Vertex UVs of a set; falls back to the first set if there is no second.
     #[inline(always)]
     pub(super) fn uvs(&self, set: UvSet) -> &[Vec2] {
         let mesh = &self.tree.loaded().mesh;
@@ -123,17 +122,17 @@ impl MeshInstance {
         }
     }
 
-    /// Texture coordinates of the corners of a triangle, in the order of [`MeshInstance::world_corners`].
+    /// UVs of a triangle's corners, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
         self.ordered(triangle, self.uvs(UvSet::First)).unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y])
     }
 
-    /// The same of the second set. `None` without one.
+    /// Second-set UVs of a triangle's corners. `None` without a second set.
     pub fn second_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
         self.ordered(triangle, &self.tree.loaded().mesh.second_uvs)
     }
 
-    /// Values of the corners of a triangle, in the order of [`MeshInstance::world_corners`]. `None` if vertices have no values.
+    /// Vertex values at a triangle's corners, in the order of [`MeshInstance::world_corners`]. `None` if `values` is empty.
     fn ordered(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
         let corners = self.tree.loaded().mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
@@ -141,8 +140,8 @@ impl MeshInstance {
         Some(if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] })
     }
 
-    /// The point at a hit by the second set of texture coordinates, with its tangents. `None` without one.
-    pub(super) fn second_parametrisation(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
+    /// UV and tangents at a hit in the second UV set. `None` without one.
+    pub(super) fn second_parameterization(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
         let mesh = &self.tree.loaded().mesh;
         if mesh.second_uvs.is_empty() {
             return None;
@@ -150,12 +149,12 @@ impl MeshInstance {
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
         let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
-        let (uv, dpdu, dpdv) = self.parametrisation(&mesh.second_uvs, vertices, barycentric, [b - a, c - a]);
+        let (uv, dpdu, dpdv) = self.parameterization(&mesh.second_uvs, vertices, barycentric, [b - a, c - a]);
         Some((uv, [dpdu, dpdv]))
     }
 
-    /// Mean curvature of the surface that a triangle approximates, by its vertices' normals (Akenine-Möller et al. 2021, section
-    /// 4), > 0 if it bulges to the front.
+    /// Mean curvature of the surface that a triangle approximates, from its vertex normals (Akenine-Möller et al. 2021, section
+    /// 4). Positive where the surface is convex on its front side.
     pub(super) fn curvature(&self, triangle: u32, normal: Vec3) -> f32 {
         if !self.smooth {
             return 0.0;
@@ -174,23 +173,27 @@ impl MeshInstance {
         ((along(0) + along(1) + along(2)) / 3.0) as f32
     }
 
-    /// The mesh by its own placement, given in its kind.
+    /// This mesh with `placement`, which must represent its transform.
     #[inline(always)]
     pub(super) fn placed<P>(&self, placement: P) -> PlacedMesh<P> {
-        PlacedMesh { placement, aside: self.aside, has_rounded_corners: self.is_merged && self.is_moved }
+        PlacedMesh {
+            placement,
+            edge_margin: self.edge_margin,
+            has_rounded_corners: self.is_merged && self.is_transformed,
+        }
     }
 
-    /// The requested parts of the surface at a hit.
+    /// Computes the requested surface attributes at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
-        match self.is_moved {
+        match self.is_transformed {
             true => self.surface_in(self.placed(&self.transform), ray, hit, asked),
-            false => self.surface_in(self.placed(Unmoved), ray, hit, asked),
+            false => self.surface_in(self.placed(IdentityPlacement), ray, hit, asked),
         }
     }
 
     fn surface_in(
         &self,
-        placed: PlacedMesh<impl Placement>,
+        placed: PlacedMesh<impl MeshPlacement>,
         ray: &RayF64,
         hit: &ShapeHit,
         asked: SurfaceRequest,
@@ -198,13 +201,13 @@ impl MeshInstance {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let facet = placed.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
-        let Facet { corners: [a, b, c], normal, barycentric, .. } = facet;
+        let TrianglePoint { corners: [a, b, c], normal, barycentric, .. } = facet;
         let [point, error] = match facet.is_doubtful() {
             true => placed.corrected(&facet, ray, [hit.u, hit.v]),
             false => [facet.point, facet.error],
         };
         let (uv, dpdu, dpdv) = if asked.uv {
-            self.parametrisation(&mesh.uvs, vertices, barycentric, [b - a, c - a])
+            self.parameterization(&mesh.uvs, vertices, barycentric, [b - a, c - a])
         } else {
             (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
         };
@@ -230,8 +233,8 @@ impl MeshInstance {
         }
     }
 
-    /// Texture coordinates and their tangents; without texture coordinates, the barycentric ones.
-    fn parametrisation(
+    /// UV and its tangents; barycentric coordinates serve as UVs if the mesh has none.
+    fn parameterization(
         &self,
         uvs: &[Vec2],
         vertices: [usize; 3],
@@ -254,7 +257,7 @@ impl MeshInstance {
         (uv, world(dpdu), world(dpdv))
     }
 
-    /// The nearest hits of the rays in `met`; the others end below 0.
+    /// Finds the nearest hits of the rays in `met`. Other lanes have negative `ends`.
     #[inline(never)]
     pub(super) fn closest_rows(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
         let mut hits = [None; PACKET_SIZE];
@@ -266,7 +269,8 @@ impl MeshInstance {
         }
     }
 
-    /// A bit for each ray in `met` that hits any triangle but its own of `except`.
+    /// Returns the mask of rays in `met` that hit any triangle other than the one they ignore (see `except` in
+    /// [`Object::any_rows`](super::Object::any_rows)).
     #[inline(never)]
     pub(super) fn any_rows(
         &self,
@@ -282,14 +286,14 @@ impl MeshInstance {
         self.tree.triangles().any_packet(&local, ends, &parts)
     }
 
-    /// The rays of a packet that are in `met`, in the mesh's coordinates; other lanes get the first of these rays, which goes in a
-    /// similar direction.
+    /// Transforms the rays in `met` to mesh coordinates. Other lanes get a copy of the first such ray, whose direction is likely
+    /// similar.
     #[inline]
     fn local_rays(&self, rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
             let ray = ray.leaving(self.own_number(ray.start));
-            if self.is_moved { self.moved(&ray) } else { ray }
+            if self.is_transformed { self.moved(&ray) } else { ray }
         };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];
         for lane in lanes(met & met.wrapping_sub(1)) {
@@ -309,7 +313,7 @@ mod tests {
     use crate::scene::description::Accel;
 
     #[test]
-    fn points_of_a_moved_mesh_are_between_its_corners() {
+    fn transformed_points_are_within_their_error() {
         let mut next = random(23);
         let mut vector = || DVec3::from_array(std::array::from_fn(|_| f64::from(next())));
         let mesh = TriangleMesh {

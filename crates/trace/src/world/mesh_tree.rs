@@ -1,4 +1,4 @@
-//! A mesh file's triangles under their tree, shared by every instance.
+//! The acceleration structure of one mesh file, shared by all its instances.
 
 use std::sync::{Arc, OnceLock};
 
@@ -10,21 +10,18 @@ use crate::geometry::Aabb;
 use crate::math::Vec3;
 use crate::scene::description::Accel;
 
-/// Triangles in the mesh's own coordinates, in the leaves of a tree.
+/// A mesh and its tree, in mesh coordinates.
 #[derive(Debug)]
 pub struct MeshTree {
     loaded: Arc<LoadedMesh>,
     tree: TriangleTree,
     accel: Accel,
-    /// Vertex normals, computed at their first use if the file has none.
+    /// Vertex normals, computed on first use if the file has none.
     computed_normals: OnceLock<Vec<Vec3>>,
 }
 
 impl MeshTree {
-    /// Builds a tree of the requested kind.
-    ///
-    /// # Errors
-    /// [`Cancelled`].
+    /// Builds a tree of the given type.
     pub fn build(loaded: Arc<LoadedMesh>, accel: Accel, token: &CancelToken) -> Result<Self, Cancelled> {
         let mesh = &loaded.mesh;
         let (count, corners) = (mesh.triangles.len() as u32, |id| mesh.corners(id));
@@ -32,7 +29,7 @@ impl MeshTree {
         Ok(Self { loaded, tree, accel, computed_normals: OnceLock::new() })
     }
 
-    /// The file's content.
+    /// The mesh file's contents.
     pub fn loaded(&self) -> &LoadedMesh {
         &self.loaded
     }
@@ -42,39 +39,36 @@ impl MeshTree {
         &self.tree
     }
 
-    /// The kind of its tree.
+    /// The type of tree.
     pub fn accel(&self) -> Accel {
         self.accel
     }
 
-    /// The box around all triangles.
+    /// Bounding box of all triangles.
     pub fn bounds(&self) -> Aabb {
         self.tree.bounds()
     }
 
-    /// Vertex normals: the file's, or computed ones, at once if [`MeshTree::prepare_normals`] was called.
+    /// Vertex normals from the file, or computed ones; immediate after [`MeshTree::prepare_normals`].
     pub fn normals(&self) -> &[Vec3] {
         if !self.loaded.mesh.normals.is_empty() {
             return &self.loaded.mesh.normals;
         }
-        // A token that nobody cancels.
+        // This token is never canceled.
         let compute = || vertex_normals(&self.loaded.mesh, &CancelToken::new()).unwrap_or_default();
         self.computed_normals.get_or_init(compute)
     }
 
-    /// Computes the normals if the file has none.
-    ///
-    /// # Errors
-    /// [`Cancelled`].
+    /// Computes vertex normals if the file has none.
     pub fn prepare_normals(&self, token: &CancelToken) -> Result<(), Cancelled> {
         if self.loaded.mesh.normals.is_empty() && self.computed_normals.get().is_none() {
-            // Another thread may have been faster: then both have the same.
+            // If another thread was faster, its result is identical.
             let _ = self.computed_normals.set(vertex_normals(&self.loaded.mesh, token)?);
         }
         Ok(())
     }
 
-    /// Bytes of the tree with its copy of the triangles.
+    /// Bytes of the tree, including its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         self.tree.memory_bytes()
     }

@@ -1,146 +1,147 @@
-//! Everything ready to trace: immutable, shared by `Arc`.
+//! The traceable world: geometry, materials, lights and camera, immutable and shared through `Arc`.
 
-mod along;
-mod around;
 mod assemble;
-mod bodies;
+mod box_query;
 pub mod camera;
+mod camera_interior;
 pub mod contact;
 mod coplanar;
-mod dark;
 mod emitters;
-mod few;
 pub mod geometry;
-mod inside;
+mod glass_solids;
 mod isolated;
 mod lower;
 mod merged;
-mod mesh_facet;
 mod mesh_instance;
-mod mesh_rows;
+mod mesh_packet;
 pub mod mesh_tree;
+mod null_interaction;
 mod object;
 mod origin;
 mod packet;
+mod packet_material;
 mod placement;
-mod plain;
-mod straight;
+mod ray_nodes;
+mod small_mesh;
 pub mod textures;
+mod triangle_point;
 mod triangle_tree;
+mod unlit_glass;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 pub use crate::accel::{PACKET_SIZE, RayInterval, SimdKernel, TreeNode};
-pub use bodies::{Bodies, OpenGlass};
 pub use camera::Camera;
-pub use contact::{Meeting, Near, NearMemory, Sides};
+pub use camera_interior::CompoundSolid;
+pub use contact::{CoincidentSurface, ContactQuery, ContactScratch, OffsetPoints};
 pub use coplanar::{Coplanar, coplanar_lights, with_lifted_lights};
-pub use dark::LampBox;
 pub use emitters::{lights, photon_source, sky};
 pub use geometry::{Geometry, Hit};
-pub use inside::BodyInParts;
+pub use glass_solids::{GlassSolids, OpenGlass};
 pub use lower::{file_emits, file_is_glass};
 pub use merged::MergedMeshes;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
+pub use null_interaction::{MAX_NULL_INTERACTIONS, Transmittance};
 pub use object::Object;
 pub use origin::origin;
-pub use plain::PlainMaterial;
-pub use straight::{MOST_STRAIGHT, Weakened};
+pub use packet_material::PacketMaterial;
 pub use textures::{
-    Cutoff, Lookups, NeededTexture, TextureSource, environment_source, material_source, textures_needed,
+    Cutoff, NeededTexture, TextureNeeds, TextureSource, environment_source, material_source, textures_needed,
 };
+pub use unlit_glass::LightBox;
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::SurfacePoint;
 use crate::geometry::packet::lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
-use crate::materials::{Footprint, Material, Mipmaps, SecondPoint, TexturePoint};
+use crate::materials::{Footprint, Material, Mipmaps, SecondUvPoint, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description;
 
-/// The images of a scene.
+/// The decoded images of a scene, by source.
 pub type Images = HashMap<TextureSource, Image>;
 
 /// A decoded image.
 #[derive(Clone, Debug)]
 pub struct Image {
-    /// The image.
+    /// The full-resolution pixels.
     pub texels: Arc<Texels>,
     /// Its mip levels. `None` if no texture needs them.
     pub mipmaps: Option<Arc<Mipmaps>>,
 }
 
-/// Parts of a world.
+/// Prepared inputs from which a world is assembled.
 #[derive(Clone, Debug, Default)]
-pub struct Parts {
-    /// One tree for each of [`crate::scene::description::Scene::mesh_files`].
+pub struct WorldInputs {
+    /// One tree per entry of [`crate::scene::description::Scene::mesh_files`].
     pub meshes: Vec<Arc<MeshTree>>,
-    /// The images that [`textures_needed`] named.
+    /// The images listed by [`textures_needed`].
     pub images: Images,
-    /// The orbiter file of the scene's camera. `None` if the scene has a camera of its own.
+    /// Contents of the orbiter file. `None` if the scene file defines the camera itself.
     pub orbiter: Option<OrbiterCamera>,
-    /// A camera in place of the scene's.
+    /// Replaces the scene's camera.
     pub camera: Option<description::Camera>,
-    /// The bodies of glass, if they were found before.
-    pub bodies: Option<Arc<Bodies>>,
+    /// The glass solids, if already known.
+    pub glass_solids: Option<Arc<GlassSolids>>,
 }
 
-/// A scene that can be traced.
+/// A scene ready for tracing.
 #[derive(Debug)]
 pub struct World {
     /// The camera.
     pub camera: Camera,
-    /// Objects under their tree.
+    /// All objects and their acceleration structures.
     pub geometry: Arc<Geometry>,
-    /// Materials; objects refer to them by index.
+    /// Materials, indexed by the objects.
     pub materials: Vec<Material>,
-    /// What rows need to know of each material that is plain.
-    plain: Box<[Option<PlainMaterial>]>,
-    /// Whether the lobes of any material depend on the direction of texture coordinates.
+    /// Packet-shading data of each material. `None` for materials that are not plain.
+    packet_material: Box<[Option<PacketMaterial>]>,
+    /// Whether any material's lobes depend on the directions of the texture axes.
     has_directions: bool,
     /// [`Material::is_textured`] of each material.
     textured: Box<[bool]>,
-    /// Material of each object, or the range of a mesh file's own materials.
+    /// For each object, its material or the materials of its mesh file.
     object_materials: Vec<ObjectMaterial>,
-    /// Lights of every kind.
+    /// All lights.
     pub lights: Arc<Lights>,
-    /// Bodies of glass: which surfaces belong together.
-    bodies: Arc<Bodies>,
-    /// Whether any body of glass is open.
+    /// Groups of surfaces that enclose one glass solid.
+    glass_solids: Arc<GlassSolids>,
+    /// Whether any glass solid has holes.
     has_open_glass: bool,
     /// Whether any material is glass.
     has_glass: bool,
-    /// Whether the surface of any glass is rough.
+    /// Whether any glass surface is rough.
     has_rough_glass: bool,
-    /// Whether each object is the place of a body of glass without a lamp in it; empty without rough glass.
-    dark_bodies: Box<[bool]>,
-    /// The closed shapes of glass that the lens may be in, with their materials.
-    glass_at_eye: Vec<(u32, u32)>,
-    /// The other bodies of glass that the camera is in, with their materials.
-    bodies_at_eye: Vec<(u32, u32)>,
+    /// For each object that represents a glass solid, whether that solid is closed and contains no light. Empty without rough
+    /// glass.
+    unlit_glass: Box<[bool]>,
+    /// Closed glass shapes that may contain points of the lens, with their materials.
+    lens_glass: Vec<(u32, u32)>,
+    /// Other glass solids that contain the camera, with their materials.
+    camera_solids: Vec<(u32, u32)>,
     /// [`Material::is_mipmapped`] of each material.
     mipmapped: Box<[bool]>,
-    /// Whether any texture is looked up by a mesh's second set of coordinates.
+    /// Whether any texture uses a mesh's second UV set.
     has_second_uvs: bool,
-    /// Whether the vertex colours of each object count. `None` if those of none do.
+    /// Whether each object's vertex colors are used. `None` if no object's are.
     colored: Option<Box<[bool]>>,
-    /// Objects that light may pass straight on. `None` if there are none.
-    passable: Option<Box<straight::Passable>>,
+    /// Objects that light may pass undeflected. `None` if there are none.
+    see_through: Option<Box<null_interaction::SeeThrough>>,
 }
 
-/// Map from an object to its material.
+/// Material assignment of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ObjectMaterial {
-    /// One material for all of the object.
+    /// One material for the whole object.
     One(u32),
-    /// Materials of the file, one for each triangle, counted from here.
+    /// The mesh file's materials, per triangle.
     OfFile {
-        /// Index of the file's first material.
+        /// Index of the file's first material in [`World::materials`].
         first: u32,
-        /// Material of triangles that name none.
+        /// Material of triangles without one in the file.
         fallback: u32,
     },
 }
@@ -157,14 +158,14 @@ impl World {
         }
     }
 
-    /// Name of the material that a mesh file gives the triangle of a hit. `None` if it gives none.
-    pub fn own_material_name(&self, hit: &Hit) -> Option<&str> {
+    /// Name of the hit triangle's material in its mesh file. `None` if the file assigns none.
+    pub fn file_material_name(&self, hit: &Hit) -> Option<&str> {
         let own = self.geometry.file_material(hit.object, hit.shape.primitive)?;
         let mesh = self.geometry.objects()[hit.object as usize].mesh()?;
         mesh.tree.loaded().materials.get(own as usize).map(|material| material.name.as_str())
     }
 
-    /// The materials that an object may have anywhere.
+    /// All materials that parts of an object may have.
     pub fn materials_of(&self, object: u32) -> impl Iterator<Item = &Material> {
         let (first, count, one) = match self.object_materials[object as usize] {
             ObjectMaterial::One(index) => (0, 0, index),
@@ -176,9 +177,9 @@ impl World {
         self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
     }
 
-    /// Indices of the materials at some lanes of a row that hit one object; any index for other lanes.
+    /// Material indices for the lanes in `of`, which all hit `object`. Other lanes get arbitrary valid indices.
     #[inline(always)]
-    pub fn row_of_materials(
+    pub fn packet_materials(
         &self,
         object: u32,
         of: u32,
@@ -209,20 +210,19 @@ impl World {
         self.mipmapped[material]
     }
 
-    /// Whether vertex colours count at an object.
+    /// Whether an object's vertex colors are used.
     #[inline]
     pub fn is_colored(&self, object: u32) -> bool {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
-    /// The vertex colour at a hit, by which the material's colour is multiplied. `None` if it does not count.
+    /// The vertex color that tints the material at a hit. `None` if vertex colors are not used.
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
-    /// The place in textures of a surface at a hit, whose footprint is that of a point or of a beam by the tangents of the
-    /// coordinates.
+    /// Texture coordinates at a hit, with the footprint that `footprint` derives from the tangents.
     #[inline]
     pub fn texture_point(
         &self,
@@ -234,21 +234,21 @@ impl World {
         TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
     }
 
-    /// The same by the second set of coordinates. `None` without one.
+    /// The second UV set's part of [`World::texture_point`]. `None` if the mesh has no second set.
     #[cold]
     #[inline(never)]
     fn second_point(
         &self,
         hit: &Hit,
         footprint: impl Fn([Vec3; 2]) -> Footprint,
-    ) -> Option<Box<SecondPoint>> {
+    ) -> Option<Box<SecondUvPoint>> {
         let (uv, tangents) = self.geometry.second_uv(hit)?;
-        Some(Box::new(SecondPoint { uv: uv.as_dvec2(), footprint: footprint(tangents), tangents }))
+        Some(Box::new(SecondUvPoint { uv: uv.as_dvec2(), footprint: footprint(tangents), tangents }))
     }
 
-    /// Whether an object has texture coordinates of its own, in place of barycentric ones, or no material asks for their direction.
+    /// Whether an object's texture axes are well defined or irrelevant: it has UVs, or no lobe depends on their directions.
     #[inline]
-    pub fn has_coordinates(&self, object: u32) -> bool {
+    pub fn has_texture_axes(&self, object: u32) -> bool {
         if !self.has_directions {
             return true;
         }
@@ -261,28 +261,28 @@ impl World {
         self.has_glass
     }
 
-    /// Whether the surface of any glass is rough.
+    /// Whether any glass surface is rough.
     #[inline]
     pub fn has_rough_glass(&self) -> bool {
         self.has_rough_glass
     }
 
-    /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.
+    /// Whether any texture has mip levels, so that rays must track their footprints.
     pub fn has_mipmaps(&self) -> bool {
         self.mipmapped.contains(&true)
     }
 
-    /// Number of triangles over all mesh instances and single triangles.
+    /// Total number of triangles, with every mesh instance counted in full.
     pub fn triangle_count(&self) -> u64 {
         self.geometry.objects().iter().map(Object::triangle_count).sum()
     }
 
-    /// Number of shapes of any kind; a mesh instance counts as one.
+    /// Number of objects; a mesh instance counts as one.
     pub fn object_count(&self) -> u64 {
         self.geometry.objects().len() as u64
     }
 
-    /// Bytes of all trees, shared ones counted once.
+    /// Bytes of all acceleration structures; shared ones count once.
     pub fn accel_memory_bytes(&self) -> usize {
         self.geometry.memory_bytes()
     }

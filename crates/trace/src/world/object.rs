@@ -1,11 +1,11 @@
-//! Objects of a scene: shapes and meshes.
+//! Objects of a scene: shapes and mesh instances.
 
 use super::mesh_instance::MeshInstance;
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::packet::{HitPacket, RayPacket};
 use crate::geometry::sphere::Sphere;
 use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
-use crate::lights::{Ball, Outline};
+use crate::lights::{BoundingSphere, EmitterGeometry};
 use crate::math::lanes::Simd;
 
 /// An object that rays can hit.
@@ -18,7 +18,7 @@ pub enum Object {
 }
 
 impl Object {
-    /// The nearest hit.
+    /// Returns the nearest hit.
     pub fn closest(&self, ray: &Ray, ray_f64: &RayF64) -> Option<ShapeHit> {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64),
@@ -26,7 +26,7 @@ impl Object {
         }
     }
 
-    /// Whether the ray hits any primitive of it but `except`.
+    /// Whether the ray hits any primitive of the object except `except`.
     pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
@@ -34,8 +34,8 @@ impl Object {
         }
     }
 
-    /// The nearest hits of the rays of a packet that are in `met`; the others end below 0. `found` holds no hits
-    /// before.
+    /// Finds the nearest hits of the rays in `met` and writes them to `found`, which must be empty. Lanes outside `met` have
+    /// negative `ends`.
     #[inline(always)]
     pub fn closest_rows(
         &self,
@@ -47,13 +47,13 @@ impl Object {
     ) {
         match self {
             Self::Shape(shape) => shape.intersect_packet(rows, met, ends, found, simd),
-            Self::Mesh(mesh) if mesh.has_few() => mesh.closest_of_few(rows, met, ends, found, simd),
+            Self::Mesh(mesh) if mesh.is_small() => mesh.closest_in_small(rows, met, ends, found, simd),
             Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
     }
 
-    /// A bit for each ray in `met` that hits it; the others end below 0. `except` holds the bits of the rays that ignore one
-    /// primitive each, and these primitives.
+    /// Returns the mask of rays in `met` that hit the object. Lanes outside `met` have negative `ends`. `except` is a lane mask
+    /// and, for each of its lanes, a primitive to ignore.
     #[inline(always)]
     pub fn any_rows(
         &self,
@@ -65,7 +65,7 @@ impl Object {
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) if mesh.has_few() => return mesh.any_of_few(rows, met, ends, except, simd),
+            Self::Mesh(mesh) if mesh.is_small() => return mesh.any_in_small(rows, met, ends, except, simd),
             Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
         let mut found = HitPacket::none();
@@ -80,7 +80,7 @@ impl Object {
         hit
     }
 
-    /// The requested parts of the surface at a hit.
+    /// Computes the requested surface attributes at a hit.
     pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
@@ -89,7 +89,7 @@ impl Object {
         }
     }
 
-    /// The box around it. `None` if it is infinite.
+    /// Bounding box. `None` if the object is infinite.
     pub fn bounds(&self) -> Option<Aabb> {
         match self {
             Self::Shape(shape) => shape.bounds(),
@@ -97,25 +97,25 @@ impl Object {
         }
     }
 
-    /// A ball around it. `None` if it is infinite or empty.
-    pub fn ball(&self) -> Option<Ball> {
+    /// A bounding sphere. `None` if the object is infinite or empty.
+    pub fn bounding_sphere(&self) -> Option<BoundingSphere> {
         if let Self::Shape(Shape::Sphere(Sphere { center, radius })) = self {
-            return Some(Ball { center: *center, radius: *radius });
+            return Some(BoundingSphere { center: *center, radius: *radius });
         }
         let bounds = self.bounds().filter(|bounds| !bounds.is_empty())?;
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
-        Some(Ball { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 })
+        Some(BoundingSphere { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 })
     }
 
-    /// Its outline for lights that are objects.
-    pub(super) fn outline(&self) -> Outline {
+    /// The outline used for lights that are objects.
+    pub(super) fn emitter_geometry(&self) -> EmitterGeometry {
         match self {
-            Self::Shape(shape) => Outline::Shape(*shape),
-            Self::Mesh(mesh) => Outline::Mesh { rounding: mesh.rounding() },
+            Self::Shape(shape) => EmitterGeometry::Shape(*shape),
+            Self::Mesh(mesh) => EmitterGeometry::Mesh { rounding: mesh.rounding() },
         }
     }
 
-    /// The instance that it is, if it is a mesh.
+    /// The mesh instance. `None` for shapes.
     pub fn mesh(&self) -> Option<&MeshInstance> {
         match self {
             Self::Shape(_) => None,
@@ -123,7 +123,7 @@ impl Object {
         }
     }
 
-    /// [`Object::mesh`], to be changed.
+    /// Mutable version of [`Object::mesh`].
     pub(super) fn mesh_mut(&mut self) -> Option<&mut MeshInstance> {
         match self {
             Self::Shape(_) => None,
@@ -131,7 +131,7 @@ impl Object {
         }
     }
 
-    /// Number of triangles in it.
+    /// Number of triangles.
     pub fn triangle_count(&self) -> u64 {
         match self {
             Self::Shape(shape) => shape.triangle_count(),
@@ -141,5 +141,5 @@ impl Object {
 }
 
 #[cfg(test)]
-#[path = "side_by_side_tests.rs"]
+#[path = "packet_tests.rs"]
 mod tests;

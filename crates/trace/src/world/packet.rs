@@ -1,22 +1,22 @@
-//! Up to sixteen rays at once through a scene: each gets the hit that it would get alone.
+//! Traces packets of up to 16 rays; each ray gets the same hit as without a packet.
 
 use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyTest, ClosestTest, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::packet::{HitPacket, RayPacket, lanes, traced};
-use crate::lights::{Source, SourceRow};
+use crate::lights::{LightObject, LightObjectPacket};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
-    /// [`Geometry::closest`] for at most [`PACKET_SIZE`] rays, into as many places.
+    /// [`Geometry::closest`] for up to [`PACKET_SIZE`] rays; `hits` must have the same length as `rays`.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
-        self.instructions().run(Closest { geometry: self, rays, hits });
+        self.instructions().run(ClosestKernel { geometry: self, rays, hits });
     }
 
-    /// [`Geometry::closest_packet`] inside of loops for each instruction set: hits, and their objects. `traced` are the bits of the
-    /// rays that have an end.
+    /// [`Geometry::closest_packet`] for callers inside a SIMD kernel: returns the hits and their objects. `traced` is the mask of
+    /// rays to trace.
     #[inline(always)]
     pub fn closest_rows(
         &self,
@@ -25,61 +25,72 @@ impl Geometry {
         traced: u32,
         simd: impl Simd,
     ) -> (HitPacket, [u32; PACKET_SIZE]) {
-        let mut nearest =
-            Nearest { geometry: self, rows, hits: HitPacket::none(), object: [NONE; PACKET_SIZE], simd };
+        let mut nearest = ClosestObject {
+            geometry: self,
+            rows,
+            hits: HitPacket::none(),
+            object: [NONE; PACKET_SIZE],
+            simd,
+        };
         self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
         (nearest.hits, nearest.object)
     }
 
-    /// [`Geometry::occluded`] for the segments of a packet, each with its light: a bit for each that is occluded. `traced` are the
-    /// bits of the rays that have an end. To be called inside of loops for each instruction set.
+    /// [`Geometry::occluded`] for a packet of shadow rays: returns the mask of occluded rays. `traced` is the mask of rays to
+    /// trace. Must be called inside a SIMD kernel.
     #[inline(always)]
     pub fn occluded_rows(
         &self,
         rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
-        sources: &SourceRow,
+        sources: &LightObjectPacket,
         simd: impl Simd,
     ) -> u32 {
-        simd.call(OccludedRows { geometry: self, rows, ends, traced, sources })
+        simd.call(OcclusionKernel { geometry: self, rows, ends, traced, sources })
     }
 }
 
 impl Geometry {
-    /// A bit for each ray whose light is all of a merged mesh.
+    /// Mask of rays whose light is an entire merged mesh.
     #[inline(always)]
-    pub(super) fn to_whole_merged(&self, sources: &SourceRow) -> u32 {
+    pub(super) fn to_whole_merged(&self, sources: &LightObjectPacket) -> u32 {
         if !sources.is_any || !self.has_merged() {
             return 0;
         }
         let is_whole = |lane: usize| {
-            sources.part[lane] == SourceRow::NONE
-                && self.is_whole_merged(Source::Object(sources.object[lane]))
+            sources.part[lane] == LightObjectPacket::NONE
+                && self.is_whole_merged(LightObject::Object(sources.object[lane]))
         };
         (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// [`Geometry::occluded`], one ray after the other.
+    /// [`Geometry::occluded`], ray by ray.
     #[cold]
     #[inline(never)]
-    fn occluded_by_each(&self, rows: &RayPacket, ends: &F32x16, traced: u32, sources: &SourceRow) -> u32 {
+    fn occluded_by_each(
+        &self,
+        rows: &RayPacket,
+        ends: &F32x16,
+        traced: u32,
+        sources: &LightObjectPacket,
+    ) -> u32 {
         let is_occluded =
             |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
         lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
     }
 }
 
-/// [`Geometry::occluded_rows`].
-struct OccludedRows<'a> {
+/// Kernel of [`Geometry::occluded_rows`].
+struct OcclusionKernel<'a> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
-    sources: &'a SourceRow,
+    sources: &'a LightObjectPacket,
 }
 
-impl SimdKernel for OccludedRows<'_> {
+impl SimdKernel for OcclusionKernel<'_> {
     type Output = u32;
 
     #[inline(always)]
@@ -89,19 +100,19 @@ impl SimdKernel for OccludedRows<'_> {
         if by_each != 0 {
             return geometry.occluded_by_each(rows, ends, traced, sources);
         }
-        let mut blockers = Blockers::new(geometry, rows, sources, simd);
-        geometry.visited().any_packet(rows, ends, traced, geometry.unbounded(), &mut blockers, simd)
+        let mut occluders = Occluders::new(geometry, rows, sources, simd);
+        geometry.visited().any_packet(rows, ends, traced, geometry.unbounded(), &mut occluders, simd)
     }
 }
 
-/// [`Geometry::closest_packet`].
-struct Closest<'a> {
+/// Kernel of [`Geometry::closest_packet`].
+struct ClosestKernel<'a> {
     geometry: &'a Geometry,
     rays: &'a [Ray],
     hits: &'a mut [Option<Hit>],
 }
 
-impl SimdKernel for Closest<'_> {
+impl SimdKernel for ClosestKernel<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -115,11 +126,11 @@ impl SimdKernel for Closest<'_> {
     }
 }
 
-/// No object.
+/// Placeholder for "no object".
 const NONE: u32 = u32::MAX;
 
-/// The nearest hits so far, and their objects.
-struct Nearest<'a, F> {
+/// Closest-hit test: the nearest hits so far and their objects.
+struct ClosestObject<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
     hits: HitPacket,
@@ -127,16 +138,16 @@ struct Nearest<'a, F> {
     simd: F,
 }
 
-impl<F: Simd> ClosestTest for Nearest<'_, F> {
+impl<F: Simd> ClosestTest for ClosestObject<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitPacket::none();
-        let (these, mut objects) = (of_these(met, ends), [id; PACKET_SIZE]);
+        let (these, mut objects) = (ends_within(met, ends), [id; PACKET_SIZE]);
         match self.geometry.merged(id) {
             Some(merged) => {
                 let by = self.geometry.instructions();
                 merged.closest_rows(by, self.rows, (met, &these), &mut found);
-                objects = numbered_by_object(merged, &mut found);
+                objects = renumber_by_object(merged, &mut found);
             }
             None => {
                 let object = &self.geometry.objects()[id as usize];
@@ -158,12 +169,12 @@ impl<F: Simd> ClosestTest for Nearest<'_, F> {
     }
 }
 
-/// Returns the objects of hits of merged meshes, and renumbers their triangles by object.
+/// Returns the objects of hits on merged meshes, and renumbers the hit triangles per object.
 #[inline(always)]
-fn numbered_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PACKET_SIZE] {
+fn renumber_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PACKET_SIZE] {
     let mut objects = [NONE; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        // Rays without a hit get the first triangle, without effect.
+        // Lanes without a hit look up triangle 0; the result is unused.
         let is_hit = !found.t[lane].is_nan();
         let of = merged.triangle(if is_hit { found.primitive[lane] } else { 0 });
         (objects[lane], found.primitive[lane]) = (of.object, of.primitive);
@@ -171,29 +182,34 @@ fn numbered_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PAC
     objects
 }
 
-/// Test for occluders of shadow rays.
-pub(super) struct Blockers<'a, F> {
+/// Any-hit test for shadow rays.
+pub(super) struct Occluders<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayPacket,
-    sources: &'a SourceRow,
-    /// Rays whose light is a part of an object.
+    sources: &'a LightObjectPacket,
+    /// Mask of rays whose light is a single primitive of an object.
     in_part: u32,
     simd: F,
 }
 
-impl<'a, F: Simd> Blockers<'a, F> {
-    /// The test for the rays of a packet, each with its light.
+impl<'a, F: Simd> Occluders<'a, F> {
+    /// Creates the test for a packet of shadow rays, each with its light.
     #[inline(always)]
-    pub(super) fn new(geometry: &'a Geometry, rows: &'a RayPacket, sources: &'a SourceRow, simd: F) -> Self {
+    pub(super) fn new(
+        geometry: &'a Geometry,
+        rows: &'a RayPacket,
+        sources: &'a LightObjectPacket,
+        simd: F,
+    ) -> Self {
         Self { geometry, rows, sources, in_part: in_part(sources, simd), simd }
     }
 }
 
-impl<F: Simd> AnyTest for Blockers<'_, F> {
+impl<F: Simd> AnyTest for Occluders<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if let Some(merged) = self.geometry.merged(id) {
-            let these = of_these(met, ends);
+            let these = ends_within(met, ends);
             if self.in_part & met == 0 {
                 return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), None);
             }
@@ -212,26 +228,26 @@ impl<F: Simd> AnyTest for Blockers<'_, F> {
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_rows(self.rows, met, &of_these(met, ends), except, self.simd)
+        object.any_rows(self.rows, met, &ends_within(met, ends), except, self.simd)
     }
 }
 
-/// A bit for each ray whose light is a part of an object.
+/// Mask of rays whose light is a single primitive of an object.
 #[inline(always)]
-fn in_part(sources: &SourceRow, simd: impl Simd) -> u32 {
+fn in_part(sources: &LightObjectPacket, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
     let mut in_part = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
-        in_part[lane] = if sources.part[lane] == SourceRow::NONE { 0 } else { TRUE };
+        in_part[lane] = if sources.part[lane] == LightObjectPacket::NONE { 0 } else { TRUE };
     }
     simd.movemask(&in_part)
 }
 
-/// A bit for each ray whose light is an object or a part of it.
+/// Mask of rays whose light is on object `id`.
 #[inline(always)]
-fn own_bits(sources: &SourceRow, id: u32, simd: impl Simd) -> u32 {
+fn own_bits(sources: &LightObjectPacket, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
@@ -242,9 +258,9 @@ fn own_bits(sources: &SourceRow, id: u32, simd: impl Simd) -> u32 {
     simd.movemask(&own)
 }
 
-/// The ends of the rays of `met`; the others end below 0.
+/// Copies the ends of the rays in `met`; other lanes become negative.
 #[inline(always)]
-fn of_these(met: u32, ends: &F32x16) -> F32x16 {
+fn ends_within(met: u32, ends: &F32x16) -> F32x16 {
     let mut own = [-1.0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         own[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
@@ -266,7 +282,7 @@ mod tests {
     use crate::geometry::parallelogram::Parallelogram;
     use crate::geometry::plane::Plane;
     use crate::geometry::sphere::Sphere;
-    use crate::lights::Source;
+    use crate::lights::LightObject;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
     use crate::math::{DVec3, Vec3};
@@ -274,7 +290,7 @@ mod tests {
     use crate::world::MeshTree;
     use crate::world::{MeshInstance, Object};
 
-    /// Spheres, boxes and quads in a grid, four instances of a fan of triangles, one of them where it was made, a floor.
+    /// A grid of spheres, boxes and quads; four instances of a triangle fan, one of them untransformed; and a floor.
     fn geometry(accel: Accel) -> Geometry {
         let mut mesh = TriangleMesh { positions: vec![Vec3::ZERO], ..TriangleMesh::default() };
         for i in 0..40_u32 {
@@ -306,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packet_sees_what_its_rays_see_alone() {
+    fn packet_hits_equal_single_ray_hits() {
         for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
             for instructions in InstructionSet::ALL {
                 assert_packets(&geometry(accel).with(instructions));
@@ -317,7 +333,7 @@ mod tests {
     struct Occluded<'a> {
         geometry: &'a Geometry,
         rays: &'a [Ray],
-        sources: &'a SourceRow,
+        sources: &'a LightObjectPacket,
     }
 
     impl SimdKernel for Occluded<'_> {
@@ -342,7 +358,7 @@ mod tests {
                 if i % 2 == 0 { Ray::segment(eye, to) } else { Ray::new(eye, to - eye) }
             };
             let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
-            // Leave out what some of them would hit.
+            // Let some rays ignore the triangle that they would hit.
             for ray in rays.iter_mut().step_by(4) {
                 let start = geometry.closest(ray).map_or(7, |hit| geometry.triangle_number(&hit));
                 *ray = ray.leaving(start);
@@ -352,12 +368,12 @@ mod tests {
             let alone: Vec<_> = rays.iter().map(|ray| geometry.closest(ray)).collect();
             assert_eq!(found, alone, "{rays:?}");
             let source = |lane: usize| match alone[lane] {
-                Some(hit) if lane.is_multiple_of(3) => Source::Object(hit.object),
-                Some(hit) if lane % 3 == 1 => Source::Primitive(hit.object, hit.shape.primitive),
-                _ => Source::Object(u32::MAX),
+                Some(hit) if lane.is_multiple_of(3) => LightObject::Object(hit.object),
+                Some(hit) if lane % 3 == 1 => LightObject::Primitive(hit.object, hit.shape.primitive),
+                _ => LightObject::Object(u32::MAX),
             };
             let sources: Vec<_> = (0..rays.len()).map(source).collect();
-            let mut row = SourceRow::of(Source::Nothing);
+            let mut row = LightObjectPacket::of(LightObject::Nothing);
             sources.iter().enumerate().for_each(|(lane, source)| row.set(lane, *source));
             let occluded = geometry.instructions().run(Occluded { geometry, rays: &rays, sources: &row });
             for (lane, (ray, source)) in rays.iter().zip(&sources).enumerate() {

@@ -1,24 +1,24 @@
-//! Placements of meshes in the scene. Most meshes are not moved, and their surfaces cost less then.
+//! Mesh-to-world maps. Most meshes are not transformed, and skipping the matrix makes their surfaces cheaper.
 
 use crate::math::DVec3;
 use crate::math::transform::Transform;
 
-/// A map from a mesh's coordinates to the scene's.
-pub trait Placement: Copy {
-    /// The scene's coordinates of a point.
+/// A map from mesh to world coordinates.
+pub trait MeshPlacement: Copy {
+    /// Transforms a point to world coordinates.
     fn point(self, local: DVec3) -> DVec3;
 
-    /// Bounds on the components of a direction in the scene, by those in the mesh.
+    /// Bounds the absolute components of a transformed direction, given bounds on its components in the mesh.
     fn reach(self, local: DVec3) -> DVec3;
 
-    /// A normal in the scene, of any length.
+    /// Transforms a normal; the result is not normalized.
     fn normal(self, local: DVec3) -> DVec3;
 
-    /// The scene's coordinates of the mesh's origin.
+    /// The mesh's origin in world coordinates.
     fn shift(self) -> DVec3;
 }
 
-impl Placement for &Transform {
+impl MeshPlacement for &Transform {
     #[inline(always)]
     fn point(self, local: DVec3) -> DVec3 {
         Transform::point(self, local)
@@ -40,14 +40,14 @@ impl Placement for &Transform {
     }
 }
 
-/// The placement of a mesh whose coordinates are the scene's.
+/// The identity: mesh coordinates are world coordinates.
 #[derive(Clone, Copy)]
-pub struct Unmoved;
+pub struct IdentityPlacement;
 
-impl Placement for Unmoved {
+impl MeshPlacement for IdentityPlacement {
     #[inline(always)]
     fn point(self, local: DVec3) -> DVec3 {
-        // As a sum with the scene's origin: −0 becomes 0.
+        // Match the matrix version, which adds the translation: −0 becomes +0.
         local + DVec3::ZERO
     }
 
@@ -58,7 +58,7 @@ impl Placement for Unmoved {
 
     #[inline(always)]
     fn normal(self, local: DVec3) -> DVec3 {
-        // Zeros get the sign that a product with a matrix gives them, as tangents depend on it.
+        // Match the signs of zeros in the matrix product; tangents depend on them.
         let DVec3 { x, y, z } = local;
         local + (DVec3::new(y, z, x) * 0.0 + DVec3::new(z, x, y) * 0.0)
     }

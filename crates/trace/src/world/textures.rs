@@ -1,4 +1,4 @@
-//! Image files that a scene looks up.
+//! Determines which image files a scene needs.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -9,61 +9,61 @@ use crate::assets::image::{ColorCurve, ImageEncoding};
 use crate::assets::{FileMaterial, FileTexture, LoadedMesh};
 use crate::math::Vec3;
 use crate::scene::description::{
-    Channel, Encoding, Material, PixelNumber, Scene, TextureFilter, TextureRole, TextureUse,
+    Channel, Encoding, Material, PixelValue, Scene, TextureFilter, TextureRole, TextureUse,
 };
 
-/// An image file, and the encoding of its numbers.
+/// An image file and how its values are encoded.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TextureSource {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Number of the image in a glTF file. `None` if the file is an image.
+    /// Index of the image in a glTF file. `None` for image files.
     pub image: Option<u32>,
-    /// Encoding of its numbers.
+    /// How its values are encoded.
     pub encoding: ImageEncoding,
-    /// Cutoff of the opacity, if the mip levels are of its coverage.
+    /// The alpha cutoff whose coverage the mip levels preserve. `None` for ordinary mip levels.
     pub coverage: Option<Cutoff>,
 }
 
-/// A cutoff of opacity, by its bits.
+/// An alpha cutoff, stored as the bits of an `f32` so that it can be hashed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Cutoff(u32);
 
 impl Cutoff {
-    /// A cutoff of the opacity, as one of the numbers of an image with this factor.
+    /// From the cutoff of the opacity to that of the pixel values of an image with this factor.
     pub fn new(cutoff: f32, factor: f32) -> Self {
         Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
     }
 
-    /// The number from which the surface exists.
+    /// The smallest pixel value at which the surface is opaque.
     pub fn value(self) -> f32 {
         f32::from_bits(self.0)
     }
 }
 
-/// An image file that is needed.
+/// An image file that must be loaded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NeededTexture {
-    /// File and encoding.
+    /// The file and its encoding.
     pub source: TextureSource,
-    /// Its name on progress bars.
+    /// Its name in progress bars.
     pub name: String,
-    /// Index into [`Scene::textures`]. `None` for a mesh file's own texture.
+    /// Index into [`Scene::textures`]. `None` if only a mesh file refers to it.
     pub declared: Option<usize>,
-    /// Index into [`Scene::mesh_files`] of the mesh whose material names it.
+    /// Index into [`Scene::mesh_files`] of the mesh file that refers to it.
     pub mesh_file: Option<usize>,
-    /// Name of the mesh file's material, which names it. `None` for others.
+    /// Name of the mesh file's material that refers to it. `None` for other textures.
     pub material: Option<String>,
-    /// Name of a material that takes its normals from it. `None` if no material does.
+    /// Name of a material that uses it as a normal map. `None` if no material does.
     pub normals_of: Option<String>,
-    /// Whether `[environment]` names it.
+    /// Whether it is the environment map.
     pub is_environment: bool,
-    /// Whether its mip levels are looked up.
+    /// Whether its mip levels are needed.
     pub has_mipmaps: bool,
 }
 
 impl NeededTexture {
-    /// The map of an environment.
+    /// The image of an environment map.
     pub fn of_environment(file: &Path) -> Self {
         Self {
             source: environment_map(file),
@@ -78,9 +78,9 @@ impl NeededTexture {
     }
 }
 
-/// Textures that a picture looks up.
+/// Which textures an image needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lookups {
+pub struct TextureNeeds {
     /// Diffuse reflectance.
     pub diffuse: bool,
     /// Glossy reflectance.
@@ -91,15 +91,15 @@ pub struct Lookups {
     pub lights: bool,
     /// Normal maps and heights.
     pub normals: bool,
-    /// All of mirrors, panes, glass and smooth coats, by which other surfaces are seen.
+    /// All textures of specular materials (mirrors, thin panes, glass, smooth coats), through which other surfaces are visible.
     pub by_delta: bool,
 }
 
-impl Lookups {
-    /// All textures.
+impl TextureNeeds {
+    /// Every texture.
     pub const ALL: Self =
         Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true, by_delta: true };
-    /// No textures but those of opacity, which every picture looks up.
+    /// No textures except opacity, which every image needs.
     pub const NONE: Self = Self {
         diffuse: false,
         specular: false,
@@ -109,7 +109,7 @@ impl Lookups {
         by_delta: false,
     };
 
-    /// The lookups of two pictures.
+    /// Combined needs of two images.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         Self {
@@ -122,7 +122,7 @@ impl Lookups {
         }
     }
 
-    /// Whether textures of a role are looked up, in a material that is δ or not.
+    /// Whether textures with this role are needed, in a material with or without δ lobes.
     fn has(self, role: TextureRole, is_delta: bool) -> bool {
         match role {
             TextureRole::Diffuse => self.diffuse,
@@ -138,9 +138,12 @@ impl Lookups {
     }
 }
 
-/// The image files that materials of objects look up for such a picture, each once. Textures that no such material names
-/// are left out.
-pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Lookups) -> Vec<NeededTexture> {
+/// Lists the image files needed by materials in use, without duplicates.
+pub fn textures_needed(
+    scene: &Scene,
+    meshes: &[Arc<LoadedMesh>],
+    lookups: TextureNeeds,
+) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
     let mut known = HashMap::new();
     let mut add = |texture: NeededTexture| match known.entry(texture.source.clone()) {
@@ -193,7 +196,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
     needed
 }
 
-/// Whether the mip levels of a texture of the scene file are looked up.
+/// Whether a texture's filter uses mip levels.
 fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     match scene.textures[texture].filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => false,
@@ -201,7 +204,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     }
 }
 
-/// Source of the environment's map. `None` without a map, or if its factor is black.
+/// The environment map's file. `None` without a map, or if its color factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
     environment_file(scene).map(environment_map)
 }
@@ -215,8 +218,7 @@ fn environment_map(file: &Path) -> TextureSource {
     TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
 }
 
-/// Whether each material of the scene belongs to an object, and whether each mesh file's own materials belong to an
-/// instance.
+/// Which of the scene's materials are used by objects, and which mesh files' materials are used by instances.
 fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
@@ -230,7 +232,7 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     (materials, files)
 }
 
-/// Source of a texture of a material of the scene file in this role.
+/// The image file and encoding of a scene material's texture in this role.
 pub fn material_source(
     scene: &Scene,
     material: &Material,
@@ -253,32 +255,32 @@ pub fn material_source(
     }
 }
 
-/// The cutoff of an opacity texture, if its mip levels are of its coverage.
+/// The cutoff whose coverage an opacity texture's mip levels preserve. `None` without a cutoff or mip levels.
 pub fn coverage(scene: &Scene, texture: usize, cutoff: f32) -> Option<Cutoff> {
     let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
     is_covered.then(|| Cutoff::new(cutoff, scene.textures[texture].factor.x))
 }
 
-/// Use of a texture of a material of the scene file.
+/// How a scene material's texture is used in this role.
 pub fn texture_use(scene: &Scene, material: &Material, (texture, role): (usize, TextureRole)) -> TextureUse {
     match role.texture_use() {
         TextureUse::Color | TextureUse::CutOut => {
             let is_alpha = |number| match number {
-                PixelNumber::Opacity | PixelNumber::Channel(Channel::Alpha) => true,
-                PixelNumber::Luminance | PixelNumber::Channel(_) | PixelNumber::Mask { .. } => false,
+                PixelValue::Opacity | PixelValue::Channel(Channel::Alpha) => true,
+                PixelValue::Luminance | PixelValue::Channel(_) | PixelValue::Mask { .. } => false,
             };
             let opacity = material.opacity.texture().filter(|(_, number)| is_alpha(*number));
             let is_cut_out = opacity.is_some_and(|(opacity, _)| is_same_image(scene, opacity, texture));
             if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
         }
-        TextureUse::Number(PixelNumber::Opacity) if !is_color(scene, material, texture) => {
-            TextureUse::Number(PixelNumber::Mask { of_any_color: false })
+        TextureUse::Number(PixelValue::Opacity) if !is_color(scene, material, texture) => {
+            TextureUse::Number(PixelValue::Mask { of_any_color: false })
         }
         used @ (TextureUse::Number(_) | TextureUse::Normal) => used,
     }
 }
 
-/// Whether the image of a texture is also that of a color of the material.
+/// Whether the material also uses the texture's image for a color.
 fn is_color(scene: &Scene, material: &Material, texture: usize) -> bool {
     let image = |texture: usize| (&scene.textures[texture].file.value, scene.textures[texture].image);
     material
@@ -287,7 +289,7 @@ fn is_color(scene: &Scene, material: &Material, texture: usize) -> bool {
         .any(|(other, role)| role.texture_use() == TextureUse::Color && image(other) == image(texture))
 }
 
-/// Whether two textures show the same image at the same coordinates.
+/// Whether two textures are the same image with the same texture coordinates.
 fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
     let [a, b] = [a, b].map(|texture| &scene.textures[texture]);
     let at = |texture: &crate::scene::description::Texture| {
@@ -296,7 +298,7 @@ fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
     a.file.value == b.file.value && at(a) == at(b)
 }
 
-/// Source of a texture of the scene file for this use.
+/// The image file and encoding of a scene texture for this use.
 pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
@@ -316,7 +318,7 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
     TextureSource { path: texture.file.value.clone(), image: texture.image, encoding, coverage: None }
 }
 
-/// Source of a texture of a mesh file for this use.
+/// The image file and encoding of a mesh file's texture for this use.
 pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,
@@ -327,34 +329,37 @@ pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
     TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }
 }
 
-/// Use of textures of mesh files as numbers.
-pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelNumber::Luminance);
+/// How mesh files' textures supply scalar parameters.
+pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelValue::Luminance);
 
-/// Use of a color texture of a mesh file's material.
+/// How a color texture of a mesh file's material is used.
 pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
     let is_alpha = |opacity: &&FileTexture| match opacity.number {
-        None | Some(PixelNumber::Opacity | PixelNumber::Channel(Channel::Alpha)) => true,
-        Some(PixelNumber::Luminance | PixelNumber::Channel(_) | PixelNumber::Mask { .. }) => false,
+        None | Some(PixelValue::Opacity | PixelValue::Channel(Channel::Alpha)) => true,
+        Some(PixelValue::Luminance | PixelValue::Channel(_) | PixelValue::Mask { .. }) => false,
     };
     let opacity = own.opacity_texture.as_ref().filter(is_alpha);
     let is_cut_out = opacity.is_some_and(|opacity| opacity.is_same_image(texture));
     if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
 }
 
-/// Use of the texture of a mesh file's opacity.
+/// How the opacity texture of a mesh file's material is used.
 pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> TextureUse {
     let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
     let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);
-    let number = if is_color { PixelNumber::Opacity } else { PixelNumber::Mask { of_any_color: true } };
+    let number = if is_color { PixelValue::Opacity } else { PixelValue::Mask { of_any_color: true } };
     TextureUse::Number(number)
 }
 
-fn file_textures(own: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&FileTexture, TextureUse)> {
+fn file_textures(
+    own: &FileMaterial,
+    lookups: TextureNeeds,
+) -> impl Iterator<Item = (&FileTexture, TextureUse)> {
     let shared = [
         (&own.diffuse_texture, TextureRole::Ambient),
         (&own.emission_texture, TextureRole::Emission),
         (&own.normal_texture, TextureRole::NormalMap),
-        (&own.opacity_texture, TextureRole::Opacity(PixelNumber::Opacity)),
+        (&own.opacity_texture, TextureRole::Opacity(PixelValue::Opacity)),
     ];
     let of_kind = match &own.physical {
         None => vec![
@@ -363,8 +368,8 @@ fn file_textures(own: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (
         ],
         Some(physical) => vec![
             (&own.diffuse_texture, TextureRole::Facets),
-            (&physical.roughness_texture, TextureRole::Roughness(PixelNumber::Luminance)),
-            (&physical.metallic_texture, TextureRole::Roughness(PixelNumber::Luminance)),
+            (&physical.roughness_texture, TextureRole::Roughness(PixelValue::Luminance)),
+            (&physical.metallic_texture, TextureRole::Roughness(PixelValue::Luminance)),
         ],
     };
     let looked_up = of_kind.into_iter().chain(shared).filter(move |(_, role)| lookups.has(*role, false));
@@ -372,7 +377,7 @@ fn file_textures(own: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (
         let texture = texture.as_ref()?;
         let used = match role.texture_use() {
             TextureUse::Color | TextureUse::CutOut => file_color_use(own, texture),
-            TextureUse::Number(PixelNumber::Opacity) => file_opacity_use(own, texture),
+            TextureUse::Number(PixelValue::Opacity) => file_opacity_use(own, texture),
             used @ (TextureUse::Number(_) | TextureUse::Normal) => used,
         };
         Some((texture, used))

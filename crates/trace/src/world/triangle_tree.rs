@@ -1,4 +1,4 @@
-//! Trees of either kind over triangles; both give the same hits, bit for bit.
+//! Acceleration structure over triangles: a BVH or a kd-tree, with bit-identical hits.
 
 use crate::accel::wide_bvh::Quality;
 use crate::accel::{F32x16, KdTree, RayInterval, TreeNode, WideBvh};
@@ -7,20 +7,17 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::scene::description::Accel;
 
-/// A tree over triangles, which a number names.
+/// An acceleration structure over numbered triangles.
 #[derive(Debug)]
 pub enum TriangleTree {
-    /// A tree of boxes.
+    /// A bounding volume hierarchy.
     Boxes(WideBvh),
-    /// A tree of planes.
+    /// A kd-tree.
     Planes(KdTree),
 }
 
 impl TriangleTree {
-    /// Builds a tree of the requested kind over `count` triangles with these corners.
-    ///
-    /// # Errors
-    /// [`Cancelled`].
+    /// Builds a tree of the given type over `count` triangles.
     pub fn build(
         accel: Accel,
         count: u32,
@@ -34,7 +31,7 @@ impl TriangleTree {
         })
     }
 
-    /// The box around all triangles.
+    /// Bounding box of all triangles.
     pub fn bounds(&self) -> Aabb {
         match self {
             Self::Boxes(tree) => tree.bounds(),
@@ -42,7 +39,7 @@ impl TriangleTree {
         }
     }
 
-    /// Bytes of the tree with its copy of the triangles.
+    /// Bytes of the tree, including its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         match self {
             Self::Boxes(tree) => tree.memory_bytes(),
@@ -50,7 +47,7 @@ impl TriangleTree {
         }
     }
 
-    /// The nearest hit of a ray; of hits at one distance, the triangle of the lowest number.
+    /// The nearest hit; at equal distances, the lowest triangle number wins.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         match self {
             Self::Boxes(tree) => tree.closest(ray),
@@ -58,7 +55,7 @@ impl TriangleTree {
         }
     }
 
-    /// Whether the ray hits any triangle but `except`.
+    /// Whether the ray hits any triangle except `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         match self {
             Self::Boxes(tree) => tree.any(ray, except),
@@ -66,7 +63,7 @@ impl TriangleTree {
         }
     }
 
-    /// Visits the nodes of the tree whose boxes a ray meets, parents first; `visit` says whether to descend.
+    /// Visits the nodes whose boxes the ray intersects, parents first; `visit` returns whether to descend.
     pub fn along(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         match self {
             Self::Boxes(tree) => tree.along(ray, visit),
@@ -74,7 +71,7 @@ impl TriangleTree {
         }
     }
 
-    /// Visits every triangle that has a point in a box, and maybe others near it; some maybe more than once.
+    /// Visits every triangle that intersects a box. It may also visit nearby triangles, and some more than once.
     pub fn meeting(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
         match self {
             Self::Boxes(tree) => tree.meeting(bounds, visit),
@@ -82,7 +79,7 @@ impl TriangleTree {
         }
     }
 
-    /// [`TriangleTree::meeting`] until `visit` returns false; returns whether it visited all.
+    /// Like [`TriangleTree::meeting`], until `visit` returns false. Returns whether all were visited.
     pub fn meeting_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
             Self::Boxes(tree) => tree.meeting_while(bounds, visit),
@@ -90,7 +87,7 @@ impl TriangleTree {
         }
     }
 
-    /// The nearest hits of at most [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays up to their ends.
+    /// The nearest hits of up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays within their ends.
     pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         match self {
             Self::Boxes(tree) => tree.closest_packet(rays, ends, hits),
@@ -103,8 +100,8 @@ impl TriangleTree {
         }
     }
 
-    /// A bit for each of at most [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays that hits any triangle up to its end, but its own of
-    /// `except`, which may be empty.
+    /// Mask of up to [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays that hit a triangle before their ends. Each ray ignores its triangle
+    /// in `except`, which may be empty.
     pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         match self {
             Self::Boxes(tree) => tree.any_packet(rays, ends, except),

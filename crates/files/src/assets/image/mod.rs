@@ -25,9 +25,9 @@ use super::contain::contain;
 use super::read::{self, Watch};
 use super::{AssetError, FileHash, read::describe_error};
 use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
-use crate::materials::mipmaps::Halving;
+use crate::materials::mipmaps::ImageHalver;
 use crate::materials::texels::Texels;
-use crate::materials::{Mipmaps, PixelNumber};
+use crate::materials::{Mipmaps, PixelValue};
 use apart::Reporter;
 use counting::Counting;
 use exr::ExrDecoder;
@@ -55,7 +55,7 @@ pub enum ImageEncoding {
     /// One number of each pixel, in all channels; alpha is always linear.
     Number {
         /// The number.
-        of: PixelNumber,
+        of: PixelValue,
         /// Whether colours are sRGB.
         is_srgb: bool,
     },
@@ -95,10 +95,10 @@ impl ImageEncoding {
             Self::Raw => 3,
             Self::Number { of, is_srgb } => {
                 let of = match of {
-                    PixelNumber::Luminance => 0,
-                    PixelNumber::Opacity => 1,
-                    PixelNumber::Channel(channel) => 2 + channel as usize,
-                    PixelNumber::Mask { of_any_color } => 6 + usize::from(of_any_color),
+                    PixelValue::Luminance => 0,
+                    PixelValue::Opacity => 1,
+                    PixelValue::Channel(channel) => 2 + channel as usize,
+                    PixelValue::Mask { of_any_color } => 6 + usize::from(of_any_color),
                 };
                 4 + 2 * of + usize::from(is_srgb)
             }
@@ -268,7 +268,7 @@ pub fn size_within(
 /// [`Cancelled`].
 pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
     Mipmaps::of(texels, |level| {
-        let halving = Halving::new(level);
+        let halving = ImageHalver::new(level);
         let mut rows = halving.start();
         for y in 0..halving.rows() {
             token.check()?;

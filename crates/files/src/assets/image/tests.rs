@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use ::image::{ExtendedColorType, save_buffer};
 
 use super::*;
-use crate::materials::number::PixelNumber;
+use crate::materials::scalar::PixelValue;
 use crate::materials::texels::TexelData;
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
@@ -120,7 +120,7 @@ fn the_alpha_of_an_exr_is_read() {
     save_buffer(&path, &raw, 2, 1, ExtendedColorType::Rgba32F).expect("written");
     let color = load_with(&path, ImageEncoding::Color).expect("an EXR").data;
     assert_eq!(color, TexelData::Float(vec![Vec3::new(1.0, 0.5, 0.25), Vec3::new(0.0, 3.0, 2.0)]));
-    let alpha = ImageEncoding::Number { of: PixelNumber::Opacity, is_srgb: false };
+    let alpha = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };
     let opacity = load_with(&path, alpha).expect("an EXR");
     assert_eq!([opacity.get(0, 0).x, opacity.get(1, 0).x], [0.125, 0.75]);
 }

@@ -6,7 +6,7 @@ use super::{LightHit, ShapeEmitter};
 use crate::geometry::cuboid::Cuboid;
 use crate::math::{DVec3, Vec3};
 
-/// A box that shines outwards.
+/// A box that emits outward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoxEmitter {
     center: DVec3,
@@ -16,27 +16,27 @@ pub struct BoxEmitter {
     axes: [Vec3; 3],
 }
 
-/// A box relative to a point, mirrored so that the point is on the positive side of each axis.
-struct View {
-    /// Sign of the point's coordinates.
+/// A box seen from a point, mirrored so that the point is on the positive side of each axis.
+struct BoxView {
+    /// Signs of the point's coordinates.
     signs: [f32; 3],
-    /// The positive faces. The first coordinate of each is along the next axis, the second along the one after that.
-    faces: [Face; 3],
+    /// The positive faces. The first coordinate of each face is along the next axis, the second along the one after it.
+    faces: [BoxFace; 3],
 }
 
-/// A face relative to a point.
+/// A face seen from a point.
 #[derive(Clone, Copy)]
-struct Face {
+struct BoxFace {
     rectangle: SphericalRectangle,
-    /// Solid angle in sr, approximate if the face is small; 0 from behind.
+    /// Solid angle in sr, approximate for small faces; 0 from behind.
     solid_angle: f32,
 }
 
 impl ShapeEmitter for BoxEmitter {
-    /// Samples a face by its solid angle, then a point of it by solid angle.
+    /// Chooses a face proportionally to its solid angle, then a point on it uniformly over the solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let View { signs, faces } = self.seen_from(point);
+        let BoxView { signs, faces } = self.seen_from(point);
         let [a, b, c] = faces.map(|face| face.solid_angle);
         let total = a + b + c;
         let target = u[0] * total;
@@ -46,7 +46,7 @@ impl ShapeEmitter for BoxEmitter {
             let rest = if is_second { values[1] } else { values[2] };
             if is_first { values[0] } else { rest }
         };
-        let face = Face {
+        let face = BoxFace {
             rectangle: SphericalRectangle::each(faces.map(|face| face.rectangle), of),
             solid_angle: of([a, b, c]),
         };
@@ -65,7 +65,7 @@ impl ShapeEmitter for BoxEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let View { faces, .. } = self.seen_from(from);
+        let BoxView { faces, .. } = self.seen_from(from);
         let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
         let own = faces.iter().zip(self.axes).enumerate();
         let own = own.into_iter().find(|(_, (_, axis))| axis.dot(met.normal).abs() > 0.9);
@@ -86,7 +86,7 @@ impl ShapeEmitter for BoxEmitter {
 }
 
 impl BoxEmitter {
-    /// The emitter of a whole box.
+    /// The emitter of an entire box.
     pub fn new(cuboid: &Cuboid) -> Self {
         let axes = cuboid.axes();
         Self {
@@ -97,19 +97,19 @@ impl BoxEmitter {
     }
 
     #[inline(always)]
-    fn seen_from(&self, point: Vec3) -> View {
+    fn seen_from(&self, point: Vec3) -> BoxView {
         let from_center = (point.as_dvec3() - self.center).as_vec3();
         let local = self.axes.map(|axis| from_center.dot(axis));
         let face = |k: usize| {
             let side = |i: usize| [-self.half[i] - local[i].abs(), self.half[i] - local[i].abs()];
-            Face::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
+            BoxFace::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
         };
-        View { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
+        BoxView { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
     }
 }
 
-impl Face {
-    /// A face between coordinates relative to the point, in a plane at z, which is negative before the face.
+impl BoxFace {
+    /// A face between coordinates relative to the point, in a plane at z < 0 if the point is in front of it.
     #[inline(always)]
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);
@@ -118,7 +118,7 @@ impl Face {
         Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
     }
 
-    /// A point of the face, and the inverse pdf of its direction.
+    /// Samples a point on the face; returns it with the inverse pdf of its direction.
     #[inline(always)]
     fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let rectangle = &self.rectangle;

@@ -1,4 +1,4 @@
-//! Disk lights, sampled over the solid angle within 20 %.
+//! Disk lights, sampled with a density within 20 % of uniform solid angle.
 
 use std::f64::consts::TAU;
 
@@ -8,7 +8,7 @@ use crate::geometry::disk::Disk;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};
 
-/// A disk that shines from its front.
+/// A disk that emits from its front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiskEmitter {
     center: DVec3,
@@ -16,25 +16,25 @@ pub struct DiskEmitter {
     radius: f64,
 }
 
-/// A disk relative to a point: directions in an elliptical cone.
+/// A disk seen from a point: an elliptical cone of directions.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskView {
-    /// Axis of the cone, and the directions of the ellipse's axes.
+    /// Axis of the cone, then the directions of the ellipse's axes.
     axes: [DVec3; 3],
-    /// Tangents of the half angles along them.
+    /// Tangents of the half angles along the ellipse's axes.
     a: f64,
     b: f64,
-    /// Coefficients of the density of an angle around the axis, 1/(p·cos² + q·sin²).
+    /// Coefficients of the density 1/(p·cos² + q·sin²) of the angle around the axis.
     p: f64,
     q: f64,
     /// Height of the point above the front, > 0.
     height: f64,
-    /// Distance to the farthest point.
+    /// Distance to the farthest point of the disk.
     farthest: f64,
 }
 
 impl ShapeEmitter for DiskEmitter {
-    /// Samples the disk, uniformly within 20 % over the solid angle.
+    /// Samples the disk with a density within 20 % of uniform solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.seen_from(point);
@@ -58,16 +58,17 @@ impl ShapeEmitter for DiskEmitter {
 }
 
 impl DiskEmitter {
-    /// The emitter of a whole disk.
+    /// The emitter of an entire disk.
     pub fn new(disk: &Disk) -> Self {
         Self { center: disk.centroid(), normal: disk.normal(), radius: disk.radius() }
     }
 
-    /// View of the disk from a point before it. From behind, the view's height is not positive, and nothing else of it counts.
+    /// The disk seen from a point in front of it. From behind, the view's height is not positive and its other fields are
+    /// meaningless.
     ///
-    /// In the plane of the disk's normal and its middle the cone has the half angle α between the rays to the nearest and the
-    /// farthest point; across, at the bisector, β (Guillén et al., *Area-Preserving Parameterizations for Spherical Ellipses*,
-    /// 2017).
+    /// In the plane of the disk's normal and its center, the cone has the half angle α between the rays to the nearest and the
+    /// farthest point; perpendicular to it, at the bisector, β (Guillén et al., *Area-Preserving Parameterizations for Spherical
+    /// Ellipses*, 2017).
     #[inline(always)]
     pub fn seen_from(&self, point: Vec3) -> DiskView {
         let to_center = self.center - point.as_dvec3();
@@ -88,7 +89,7 @@ impl DiskEmitter {
         // Intersect the bisector with the plane.
         let middle = (near * l1 + far * l0) / both;
         let l = (middle * middle + h2).sqrt();
-        // tan α by sine and cosine of 2α times l0·l1, without differences of near numbers.
+        // Compute tan α from sin 2α and cos 2α, both times l0·l1, without cancellation.
         let (sin, cos) = (2.0 * self.radius * height, near * far + h2);
         let a = if cos > 0.0 { sin / (l0 * l1 + cos) } else { (l0 * l1 - cos) / sin };
         let b = 2.0 * self.radius * (l0 * l1).sqrt() / (both * l);
@@ -123,17 +124,17 @@ impl DiskView {
         self.height > 0.0
     }
 
-    /// A bound on the solid angle, at most 20 % above it.
+    /// Upper bound on the solid angle, at most 20 % too large.
     #[inline(always)]
     pub fn solid_angle(&self) -> f64 {
         TAU * self.a * self.b / (self.p * self.q).sqrt()
     }
 
-    /// Direction, distance to the plane, and the inverse pdf.
+    /// Samples a direction; returns it with the distance to the plane and the inverse pdf.
     ///
-    /// In a plane before the point, perpendicular to the axis, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
-    /// a·b/(Q + √Q) dφ, Q = 1 + a²cos²φ + b²sin²φ, and in it cosines to the axis are uniform. φ gets the density
-    /// ∝ 1/(p·cos²φ + q·sin²φ), whose denominator is Q + √Q at both axes and at least 1/1.2 of it between.
+    /// On a plane in front of the point, perpendicular to the axis, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
+    /// a·b/(Q + √Q) dφ, where Q = 1 + a²cos²φ + b²sin²φ, and cosines to the axis are uniform in it. φ has the density ∝
+    /// 1/(p·cos²φ + q·sin²φ), whose denominator equals Q + √Q at both axes and is at least 1/1.2 of it in between.
     #[inline(always)]
     pub fn sample(&self, normal: DVec3, u: [f32; 2]) -> (DVec3, f64, f64) {
         let (sin, cos) = sin_cos(std::f32::consts::TAU * u[1]);
@@ -152,13 +153,13 @@ impl DiskView {
         (direction, distance, self.factor(cos * cos, q + root))
     }
 
-    /// Inverse pdf at cos²φ and Q + √Q.
+    /// Inverse pdf, given cos²φ and Q + √Q.
     #[inline(always)]
     fn factor(&self, cos2: f64, slice: f64) -> f64 {
         self.solid_angle() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice
     }
 
-    /// Pdf in sr⁻¹ of a direction inside.
+    /// Pdf in sr⁻¹ of a direction inside the cone.
     pub fn pdf(&self, direction: Vec3) -> f64 {
         let direction = direction.as_dvec3();
         let [_, along, beside] = self.axes;
@@ -169,7 +170,7 @@ impl DiskView {
     }
 }
 
-/// A unit vector perpendicular to another one.
+/// A unit vector perpendicular to `n`.
 #[inline(always)]
 pub fn perpendicular(n: DVec3) -> DVec3 {
     let is_x = n.x.abs() < 0.6;

@@ -1,51 +1,51 @@
-//! Emission textures: lamps whose radiance differs from point to point, by a texture or by their opacity, or by direction under a
-//! clear coat.
+//! Emission textures: radiance that varies over a light because of a texture or opacity, or with direction because of a clear
+//! coat.
 //!
-//! Samples of a quad follow its texture; samples of other shapes do not. Each sample is multiplied by the texture at its
-//! point. Pdfs are those of the emitter, and exact.
+//! Samples of a quad follow its texture; samples of other shapes do not. Each sample is multiplied by the texture at its point.
+//! Pdfs are the emitter's and remain exact.
 
 use std::sync::Arc;
 
 use crate::geometry::triangle::weights;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
-use crate::materials::{EmissionCoat, Footprint, Opacity, SecondPoint, TexturePoint};
+use crate::materials::{EmissionCoat, Footprint, Opacity, SecondUvPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// Factor on the radiance of a lamp, from point to point and from direction to direction.
+/// Factor on the radiance of a light that varies with position and direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionTexture {
     texture: Option<Arc<Texture>>,
     opacity: Option<Opacity>,
     coat: Option<Arc<EmissionCoat>>,
-    chart: Chart,
+    chart: UvChart,
 }
 
-/// Map from the points of a lamp to their texture coordinates.
+/// Maps points on a light to texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Chart {
-    /// The shape's own texture coordinates.
+pub enum UvChart {
+    /// The shape's own UV parameterization.
     Shape(Shape),
-    /// Texture coordinates of the triangles of a mesh, in the order of their numbers.
-    Triangles(Vec<Patch>),
+    /// UVs of a mesh's triangles, sorted by primitive index.
+    Triangles(Vec<UvTriangle>),
 }
 
-/// A triangle of a mesh.
+/// A triangle with UVs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patch {
-    /// Its number in its object.
+pub struct UvTriangle {
+    /// Primitive index in its object.
     pub primitive: u32,
     /// Corners in world coordinates.
     pub corners: [DVec3; 3],
-    /// Their texture coordinates.
+    /// UVs of the corners.
     pub uvs: [Vec2; 3],
-    /// Their second set of these. `None` if the mesh has none.
+    /// UVs of the corners in the second set. `None` without one.
     pub second_uvs: Option<[Vec2; 3]>,
 }
 
 impl EmissionTexture {
-    /// The factor by a texture and by the opacity of a lamp with these texture coordinates. `None` if there is neither.
-    pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: Chart) -> Option<Self> {
+    /// The factor from a texture and an opacity. `None` if there is neither.
+    pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: UvChart) -> Option<Self> {
         Self::under_coat(texture, opacity, None, chart)
     }
 
@@ -54,7 +54,7 @@ impl EmissionTexture {
         texture: Option<&Arc<Texture>>,
         opacity: Option<&Opacity>,
         coat: Option<&Arc<EmissionCoat>>,
-        chart: Chart,
+        chart: UvChart,
     ) -> Option<Self> {
         let is_any = texture.is_some() || opacity.is_some() || coat.is_some();
         let own =
@@ -62,12 +62,12 @@ impl EmissionTexture {
         is_any.then(own)
     }
 
-    /// Whether the factor differs from point to point, in every direction.
+    /// Whether the factor varies with position.
     pub fn has_places(&self) -> bool {
         self.texture.is_some() || self.opacity.is_some()
     }
 
-    /// Factor at texture coordinates.
+    /// The factor at texture coordinates.
     #[inline]
     pub fn lookup(&self, uv: DVec2) -> Vec3 {
         self.lookup_at(&TexturePoint::sharp(uv))
@@ -82,7 +82,7 @@ impl EmissionTexture {
         }
     }
 
-    /// Number of texels in a unit of u and of v; of two textures, the greater ones.
+    /// Number of texels per unit of u and v; with both a texture and an opacity texture, the maximum.
     pub fn texels_across(&self) -> [f64; 2] {
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let across =
@@ -91,38 +91,38 @@ impl EmissionTexture {
         across.into_iter().flatten().reduce(finer).unwrap_or([1.0; 2])
     }
 
-    /// Factor at a point of the lamp, for light along a direction; `primitive` is the triangle of the mesh that contains the point.
+    /// The factor at a point on the light, for light along a direction. `primitive` is the mesh triangle that contains the point.
     #[inline]
     pub fn at(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
-        self.at_place(point, primitive) * self.left_by_coat(point, primitive, direction)
+        self.at_place(point, primitive) * self.coat_transmittance(point, primitive, direction)
     }
 
-    /// [`EmissionTexture::at`], without the coat.
+    /// [`EmissionTexture::at`] without the coat.
     pub fn at_place(&self, point: Vec3, primitive: u32) -> Vec3 {
         self.lookup_at(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
-    /// Part of the light along a direction that the clear coat lets through.
-    pub fn left_by_coat(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
+    /// Transmittance of the clear coat for light along a direction.
+    pub fn coat_transmittance(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
         let Some(coat) = &self.coat else { return 1.0 };
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
         let at = self.chart.texture_point(point, primitive);
-        // At a rim, rounding may leave no normal.
+        // At the edge of a shape, rounding may prevent finding a normal.
         let normal = self.chart.normal(point, primitive, direction);
         coat.left(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
 }
 
-/// Length of the ray that finds the normal at a point, in sizes of the lamp.
+/// Length of the ray that finds the normal at a point, relative to the size of the light.
 const PROBE: f64 = 1e-3;
 
-impl Chart {
-    /// The unit normal at a point that is seen along a direction, either way. `None` if nothing is there.
+impl UvChart {
+    /// The unit normal at a point seen along a direction, on either side. `None` if the ray misses the surface.
     fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
         match self {
             Self::Shape(shape) => {
                 let size = f64::from(shape.bounds()?.extent().max_element());
-                // Approach the point on the side from which it is seen.
+                // Approach the point from the side that it is seen from.
                 let ray =
                     RayF64 { origin: point - direction * (PROBE * size), direction, t_max: f64::INFINITY };
                 let hit = shape.intersect(&ray)?;
@@ -142,7 +142,7 @@ impl Chart {
             Self::Triangles(patches) => patches,
         };
         let found = patches.binary_search_by_key(&primitive, |patch| patch.primitive);
-        let Ok(Patch { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
+        let Ok(UvTriangle { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
             return TexturePoint::sharp(DVec2::ZERO);
         };
         let weights = weights(corners, point);
@@ -150,10 +150,10 @@ impl Chart {
             let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
             a + (b - a) * weights.x + (c - a) * weights.y
         };
-        // Colours and numbers have no tangents.
+        // Colors and scalars do not need tangents.
         let second = |uvs| {
             let (footprint, tangents) = (Footprint::POINT, [Vec3::ZERO; 2]);
-            Box::new(SecondPoint { uv: between(uvs), footprint, tangents })
+            Box::new(SecondUvPoint { uv: between(uvs), footprint, tangents })
         };
         TexturePoint { second: second_uvs.map(second), ..TexturePoint::sharp(between(uvs)) }
     }

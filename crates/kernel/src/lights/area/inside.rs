@@ -9,8 +9,8 @@ use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 
-/// The inside of a shape. From inside of a closed one it fills all directions, and they are sampled uniformly; from elsewhere it is
-/// invisible. That of an open one is sampled by area.
+/// The inside of a shape. The inside of a closed shape covers all directions from a point inside, which are sampled uniformly,
+/// and is invisible from outside. The inside of an open shape is sampled by area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InsideEmitter {
     shape: Shape,
@@ -40,11 +40,11 @@ impl ShapeEmitter for InsideEmitter {
     }
 }
 
-/// Solid angle in sr of all directions.
+/// The solid angle of the sphere, in sr.
 const ALL_AROUND: f32 = 4.0 * PI;
 
 impl InsideEmitter {
-    /// The emitter of the inside of a shape. `None` if the shape has no area.
+    /// The emitter of a shape's inside. `None` if the shape has no area.
     pub fn new(shape: &Shape) -> Option<Self> {
         Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())? })
     }
@@ -62,7 +62,7 @@ impl InsideEmitter {
         })
     }
 
-    /// Samples a place by area; nothing arrives if another part of the shape is before it.
+    /// Samples a point by area; the sample is dark if another part of the shape is in front of it.
     fn by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
         let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
@@ -78,12 +78,12 @@ impl InsideEmitter {
         LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    /// Whether nothing of the shape is before a place of it.
+    /// Whether no part of the shape is in front of the point at `distance`.
     fn is_first(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
-        self.first(point, direction).is_some_and(|first| first > distance * (1.0 - SAME_PLACE))
+        self.first(point, direction).is_some_and(|first| first > distance * (1.0 - SAME_DISTANCE))
     }
 
-    /// Distance to the first point of the shape in a direction.
+    /// Distance to the first intersection with the shape.
     fn first(&self, point: Vec3, direction: Vec3) -> Option<f32> {
         let (origin, direction) = (point.as_dvec3(), direction.as_dvec3());
         let ray = RayF64 { origin, direction, t_max: f64::INFINITY };
@@ -91,5 +91,5 @@ impl InsideEmitter {
     }
 }
 
-/// Relative difference of distances that are equal within rounding.
-const SAME_PLACE: f32 = 1e-4;
+/// Relative tolerance for equal distances.
+const SAME_DISTANCE: f32 = 1e-4;

@@ -1,30 +1,30 @@
-//! Angles around a pole, chosen by the part of a light in their half planes.
+//! Distribution of angles around a pole, weighted by the visible part of a light in each half plane.
 
-use super::linear::Linear;
+use super::piecewise_linear::PiecewiseLinear;
 use crate::math::{DVec3, Vec3};
 
-/// Number of nodes to one side at which the density is evaluated.
+/// Number of nodes on one side at which the weight is evaluated.
 const NODES: usize = 9;
 
-/// Angles around a pole to both sides of 0, up to the reach of a light. Their density is linear between a few nodes.
+/// Angles around a pole on both sides of 0, up to the reach of a light. Their density is piecewise linear.
 #[derive(Clone, Copy, Debug)]
-pub struct Meridians {
-    /// The greatest angle.
+pub struct MeridianDistribution {
+    /// The largest angle.
     reach: f64,
-    share: Linear<NODES>,
+    share: PiecewiseLinear<NODES>,
 }
 
 /// Sine and cosine of an angle.
 #[derive(Clone, Copy, Debug)]
-pub struct Turn {
+pub struct SinCos {
     /// Sine.
     pub sin: f64,
     /// Cosine.
     pub cos: f64,
 }
 
-impl Turn {
-    /// Sine and cosine of half the angle, in [0, π].
+impl SinCos {
+    /// Sine and cosine of half the angle, which is in [0, π].
     fn half(self) -> Self {
         let cos = (0.5 * (1.0 + self.cos)).max(0.0).sqrt();
         // If the cosine is 0, the angle was π.
@@ -39,32 +39,32 @@ impl Turn {
         }
     }
 
-    /// Sine and cosine of an angle.
+    /// Computes the sine and cosine of an angle.
     pub fn of(angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self { sin, cos }
     }
 }
 
-impl Meridians {
-    /// Angles up to a reach in [0, π], with densities in proportion to the weights of angles in [0, π].
-    pub fn new(reach: Turn, weight: impl Fn(Turn) -> f64) -> Self {
+impl MeridianDistribution {
+    /// A distribution over angles up to `reach` in [0, π], with density proportional to `weight`.
+    pub fn new(reach: SinCos, weight: impl Fn(SinCos) -> f64) -> Self {
         let step = reach.half().half().half();
-        let mut turn = Turn { sin: 0.0, cos: 1.0 };
+        let mut turn = SinCos { sin: 0.0, cos: 1.0 };
         let weights = std::array::from_fn(|_| {
             let own = weight(turn);
             turn = turn.and(step);
             own
         });
-        Self { reach: libm::atan2(reach.sin, reach.cos), share: Linear(weights) }
+        Self { reach: libm::atan2(reach.sin, reach.cos), share: PiecewiseLinear(weights) }
     }
 
-    /// Sum of the weights over all angles.
+    /// Integral of the weight over all angles.
     pub fn total(&self) -> f64 {
         2.0 * self.reach * self.share.mean()
     }
 
-    /// An angle, and its density per radian.
+    /// Samples an angle; returns it with its density per radian.
     pub fn sample(&self, u: f32) -> (f64, f64) {
         let side = 2.0 * f64::from(u) - 1.0;
         let (share, density) = self.share.sample(side.abs());
@@ -77,25 +77,25 @@ impl Meridians {
     }
 }
 
-/// Directions by the angle from a pole and the angle around it.
+/// Polar coordinates: the angle from a pole and the angle around it.
 #[derive(Clone, Copy, Debug)]
-pub struct Pole {
-    /// The pole.
+pub struct PolarFrame {
+    /// Direction of the pole.
     pub pole: DVec3,
-    /// Perpendicular to it, at the angle 0.
+    /// Perpendicular to the pole, at angle 0.
     pub front: DVec3,
-    /// Perpendicular to both, at a right angle.
+    /// Perpendicular to both, at 90°.
     pub side: DVec3,
 }
 
-impl Pole {
-    /// From perpendicular unit vectors.
+impl PolarFrame {
+    /// Creates a frame from perpendicular unit vectors.
     pub fn new(pole: DVec3, front: DVec3) -> Self {
         Self { pole, front, side: pole.cross(front) }
     }
 
-    /// The direction at an angle from the pole, and one around it.
-    pub fn direction(&self, from_pole: Turn, around: Turn) -> DVec3 {
+    /// The direction at an angle from the pole and an angle around it.
+    pub fn direction(&self, from_pole: SinCos, around: SinCos) -> DVec3 {
         self.pole * from_pole.cos + (self.front * around.cos + self.side * around.sin) * from_pole.sin
     }
 

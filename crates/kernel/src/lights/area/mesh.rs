@@ -1,5 +1,4 @@
-//! Emissive triangles of a mesh: two that form a parallelogram are sampled as a quad, a few others by area, many by a
-//! light tree.
+//! Mesh lights: two triangles that form a parallelogram are sampled as a quad, a few others by area, and many with a light tree.
 
 use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
@@ -8,71 +7,71 @@ use super::{LightHit, ShapeEmitter};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::AreaPoint;
 use crate::geometry::triangle::Triangle;
-use crate::lights::sample::{End, LightSample, Source};
-use crate::lights::tree::{LightBounds, LightTree, MOST_WITHOUT, Receiver};
+use crate::lights::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::lights::tree::{LightBounds, LightTree, MAX_WITHOUT_TREE, Receiver};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
 
-/// Triangles that emit along (b − a) × (c − a).
+/// Triangles that emit toward (b − a) × (c − a).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshEmitter {
-    /// Corners in world coordinates, with the number of each triangle in its object.
+    /// Corners in world coordinates, with each triangle's primitive index in its object.
     triangles: Vec<([DVec3; 3], u32)>,
     by_area: Discrete,
-    /// Centre of area.
+    /// Centroid of the area.
     center: DVec3,
-    /// Bounds of the triangles' positions and emission, for a unit of radiance.
+    /// Bounds of the triangles' positions and emission, for unit radiance.
     bounds: LightBounds,
-    sampling: Sampling,
+    sampling: MeshSampling,
 }
 
-/// Sampling of the points of a mesh.
+/// How the points of a mesh light are sampled.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Sampling {
-    /// Sampling as a quad.
-    Quad(Box<QuadOfTwo>),
-    /// Uniform over the area.
-    Area(Facets),
-    /// Sampling by a light tree over all triangles, then by the visible part of the triangle.
+pub enum MeshSampling {
+    /// As a quad.
+    Quad(Box<TrianglePairQuad>),
+    /// Uniformly over the area.
+    Area(AreaSampledTriangles),
+    /// Using a light tree over all triangles, then the visible part of the triangle.
     Tree(LightTree),
 }
 
-/// A parallelogram of two triangles.
+/// A parallelogram made of two triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct QuadOfTwo {
+pub struct TrianglePairQuad {
     quad: QuadEmitter,
-    /// The product of this and an offset from the corner is below 1 on the triangle at the corner, above on the other.
+    /// Its dot product with an offset from the corner is below 1 on the triangle at that corner, and above 1 on the other.
     across: Vec3,
-    /// The numbers of the two triangles in the object.
+    /// Primitive indices of the two triangles.
     primitives: [u32; 2],
 }
 
-/// Triangles that are sampled by area.
+/// Triangles sampled uniformly over their area.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Facets {
-    all: Vec<Facet>,
+pub struct AreaSampledTriangles {
+    all: Vec<EmissiveTriangle>,
     by_area: Discrete,
     area: f32,
 }
 
-/// A triangle with its front along `ab` × `ac`.
+/// A triangle whose front faces along `ab` × `ac`.
 #[derive(Clone, Debug, PartialEq)]
-struct Facet {
+struct EmissiveTriangle {
     corner: DVec3,
     ab: Vec3,
     ac: Vec3,
     /// Unit normal of the front.
     normal: Vec3,
-    /// Its number in the object.
+    /// Primitive index in the object.
     primitive: u32,
 }
 
 impl MeshEmitter {
-    /// An emitter from corners with their primitive numbers, which increase. `None` if there is no area.
+    /// Creates an emitter from triangles with increasing primitive indices. Returns `None` if they have no area.
     ///
     /// # Errors
-    /// [`Cancelled`] if the token is cancelled.
+    /// [`Cancelled`] if the token is canceled.
     pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
@@ -83,21 +82,21 @@ impl MeshEmitter {
         let center = center.sum::<DVec3>() / by_area.total();
         let all: Vec<_> = triangles.iter().map(|(corners, _)| LightBounds::of_triangle(corners)).collect();
         let Some(bounds) = LightBounds::around(all.iter().flatten()) else { return Ok(None) };
-        let tree = if all.len() > MOST_WITHOUT { LightTree::new(&all, token)? } else { None };
-        let sampling = match (tree, QuadOfTwo::of(&triangles)) {
-            (Some(tree), _) => Sampling::Tree(tree),
-            (None, Some(quad)) => Sampling::Quad(Box::new(quad)),
-            (None, None) => Sampling::Area(Facets::new(&triangles, &by_area)),
+        let tree = if all.len() > MAX_WITHOUT_TREE { LightTree::new(&all, token)? } else { None };
+        let sampling = match (tree, TrianglePairQuad::of(&triangles)) {
+            (Some(tree), _) => MeshSampling::Tree(tree),
+            (None, Some(quad)) => MeshSampling::Quad(Box::new(quad)),
+            (None, None) => MeshSampling::Area(AreaSampledTriangles::new(&triangles, &by_area)),
         };
         Ok(Some(Self { triangles, by_area, center, bounds, sampling }))
     }
 
-    /// Numbers of its triangles in their object.
+    /// Primitive indices of the triangles.
     pub fn primitives(&self) -> impl Iterator<Item = u32> {
         self.triangles.iter().map(|(_, primitive)| *primitive)
     }
 
-    /// Samples a point of one of its triangles uniformly; with the triangle's area and its number in the object.
+    /// Samples a point uniformly on one triangle; returns it with the triangle's area and primitive index.
     pub fn place(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
@@ -107,35 +106,35 @@ impl MeshEmitter {
         (AreaPoint { point, normal: vector_area / area }, area, *primitive)
     }
 
-    /// Bounds of the triangles' positions and emission, for a unit of radiance.
+    /// Bounds of the triangles' positions and emission, for unit radiance.
     pub fn bounds(&self) -> LightBounds {
         self.bounds
     }
 
-    /// Sampling of its points.
+    /// How its points are sampled.
     #[inline(always)]
-    pub fn sampling(&self) -> &Sampling {
+    pub fn sampling(&self) -> &MeshSampling {
         &self.sampling
     }
 
-    /// Triangles that are sampled by area. `None` if it is sampled otherwise.
+    /// The triangles, if they are sampled by area.
     #[inline(always)]
-    pub fn facets(&self) -> Option<&Facets> {
-        if let Sampling::Area(facets) = &self.sampling { Some(facets) } else { None }
+    pub fn facets(&self) -> Option<&AreaSampledTriangles> {
+        if let MeshSampling::Area(facets) = &self.sampling { Some(facets) } else { None }
     }
 
-    /// The parallelogram that two triangles form. `None` if it is sampled otherwise.
+    /// The parallelogram, if the light is sampled as a quad.
     #[inline(always)]
-    pub fn quad_of_two(&self) -> Option<&QuadOfTwo> {
-        if let Sampling::Quad(two) = &self.sampling { Some(two) } else { None }
+    pub fn triangle_pair(&self) -> Option<&TrianglePairQuad> {
+        if let MeshSampling::Quad(two) = &self.sampling { Some(two) } else { None }
     }
 
-    /// The tree over its triangles. `None` if they are few.
+    /// The light tree over the triangles, if there are many.
     pub fn tree(&self) -> Option<&LightTree> {
-        if let Sampling::Tree(tree) = &self.sampling { Some(tree) } else { None }
+        if let MeshSampling::Tree(tree) = &self.sampling { Some(tree) } else { None }
     }
 
-    /// Samples its light at a point of a surface with this normal.
+    /// Samples the light for a surface point with this normal.
     #[inline(always)]
     pub fn sample(
         &self,
@@ -145,15 +144,15 @@ impl MeshEmitter {
         (radiance, object): (Vec3, u32),
     ) -> Option<LightSample> {
         let (arrival, primitive) = match &self.sampling {
-            Sampling::Quad(quad) => {
+            MeshSampling::Quad(quad) => {
                 let arrival = quad.quad.sample(point, u);
                 (arrival, quad.part(point, arrival.target))
             }
-            Sampling::Area(facets) => {
+            MeshSampling::Area(facets) => {
                 let arrival = facets.sample(point, u);
                 (arrival, facets.part(u[0]))
             }
-            Sampling::Tree(tree) => {
+            MeshSampling::Tree(tree) => {
                 let pick = tree.pick(&Receiver::plain(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
@@ -163,19 +162,19 @@ impl MeshEmitter {
             }
         };
         (arrival.factor > 0.0).then(|| LightSample {
-            end: End::At(arrival.target),
+            end: ShadowRayEnd::At(arrival.target),
             direction: arrival.direction,
             weight: radiance * arrival.factor,
-            source: Source::Primitive(object, primitive),
+            source: LightObject::Primitive(object, primitive),
         })
     }
 
     /// [`Light::pdf`](crate::lights::Light::pdf).
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         let tree = match &self.sampling {
-            Sampling::Quad(quad) => return quad.quad.pdf(from, met),
-            Sampling::Area(_) => return met.pdf_by_area(self.by_area.total()),
-            Sampling::Tree(tree) => tree,
+            MeshSampling::Quad(quad) => return quad.quad.pdf(from, met),
+            MeshSampling::Area(_) => return met.pdf_by_area(self.by_area.total()),
+            MeshSampling::Tree(tree) => tree,
         };
         let index = self.triangles.binary_search_by_key(&met.primitive, |(_, primitive)| *primitive);
         let own = index.ok().and_then(|index| Some((index, emitter(&self.triangles[index].0)?)));
@@ -190,24 +189,24 @@ impl MeshEmitter {
         Some((*b - *a).cross(*c - *a).normalize())
     }
 
-    /// Centre of area.
+    /// Centroid of the area.
     pub fn middle(&self) -> DVec3 {
         self.center
     }
 }
 
-impl QuadOfTwo {
-    /// Largest deviation of the fourth corner from a parallelogram, in units of its size.
+impl TrianglePairQuad {
+    /// Maximum deviation of the fourth corner from a parallelogram, relative to its size.
     const FLATNESS: f64 = 1e-5;
 
-    /// The parallelogram of two triangles that share an edge. `None` if they form none.
+    /// The parallelogram formed by two triangles that share an edge. `None` if they do not form one.
     fn of(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
         let [(first, one), (second, two)] = triangles else { return None };
         let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a);
         if normal(first).dot(normal(second)) <= 0.0 {
             return None;
         }
-        // Find the corner of the first that the second lacks, and the corner that the first lacks.
+        // Find the corner that is only in the first triangle, and the one that is only in the second.
         let corner = (0..3).find(|&i| !second.contains(&first[i]))?;
         let [p, x, y] = [0, 1, 2].map(|i| first[(corner + i) % 3]);
         let far = second.iter().find(|other| !first.contains(other))?;
@@ -228,7 +227,7 @@ impl QuadOfTwo {
         &self.quad
     }
 
-    /// Number of the triangle that contains the target of a sample for a point.
+    /// Primitive index of the triangle that contains a sample's target.
     #[inline(always)]
     pub fn part(&self, point: Vec3, target: Vec3) -> u32 {
         let offset = (target - point) - self.quad.corner_from(point);
@@ -236,22 +235,22 @@ impl QuadOfTwo {
     }
 }
 
-impl Facets {
+impl AreaSampledTriangles {
     fn new(triangles: &[([DVec3; 3], u32)], by_area: &Discrete) -> Self {
         let facet = |&([a, b, c], primitive): &([DVec3; 3], u32)| {
             let (ab, ac) = (b - a, c - a);
             let normal = ab.cross(ac).normalize_or_zero().as_vec3();
-            Facet { corner: a, ab: ab.as_vec3(), ac: ac.as_vec3(), normal, primitive }
+            EmissiveTriangle { corner: a, ab: ab.as_vec3(), ac: ac.as_vec3(), normal, primitive }
         };
         let all = triangles.iter().map(facet).collect();
         Self { all, by_area: by_area.clone(), area: by_area.total() as f32 }
     }
 
-    /// Samples their light at a point.
+    /// Samples the triangles' light at a point.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (index, rest) = self.by_area.sample(u[0]);
-        let Facet { corner, ab, ac, normal, .. } = &self.all[index];
+        let EmissiveTriangle { corner, ab, ac, normal, .. } = &self.all[index];
         let weights = warp::triangle(Vec2::new(rest, u[1]));
         let offset = (*corner - point.as_dvec3()).as_vec3() + *ab * weights.y + *ac * weights.z;
         let nearness = 1.0 / offset.length_squared().sqrt();
@@ -261,7 +260,7 @@ impl Facets {
         LightSamplePoint { direction, target: point + offset, factor }
     }
 
-    /// Number of the triangle of a sample, by its first random number.
+    /// Primitive index of the triangle of a sample, given its first random number.
     #[inline(always)]
     pub fn part(&self, u: f32) -> u32 {
         self.all[self.by_area.sample(u).0].primitive

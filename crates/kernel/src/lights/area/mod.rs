@@ -1,32 +1,32 @@
-//! Shapes that emit, one file each.
+//! Emitting shapes, one file each.
 //!
-//! [`ShapeEmitter`] is all that a shape tells as a light. To add one: its file, its variant of [`Emitter`] with the arm of
-//! `of_any` and of [`area_light`], and the bounds of its emission, if it is flat. A shape without a loop of its own in `row` is
-//! sampled point by point.
+//! A shape's light sampling is entirely in its [`ShapeEmitter`]. To add a shape: its file; its variant of [`Emitter`], with an
+//! arm in `of_any` and in [`area_light`]; and the bounds of its emission, if it is flat. A shape without a loop of its own in
+//! `row` is sampled point by point.
 
 pub mod cuboid;
 pub mod disk;
 pub mod emission_texture;
 pub mod inside;
-mod linear;
 mod meridians;
 pub mod mesh;
+pub(super) mod packet;
+mod piecewise_linear;
 pub mod quad;
-pub mod round;
-pub(super) mod row;
 mod sample_point;
-pub mod sheer;
+pub mod see_through;
 pub mod sphere;
+pub mod surface_of_revolution;
 pub mod textured_quad;
 pub mod torus;
 pub mod triangle;
 
-pub use emission_texture::{Chart, EmissionTexture, Patch};
+pub use emission_texture::{EmissionTexture, UvChart, UvTriangle};
 pub use mesh::MeshEmitter;
 pub use sample_point::LightSamplePoint;
 
-use super::sample::{End, LightHit, LightSample, Source};
-use super::tree::bounds::{EmissionCone, LightBounds, strength};
+use super::sample::{LightHit, LightObject, LightSample, ShadowRayEnd};
+use super::tree::bounds::{EmissionCone, LightBounds, mean_channel};
 use crate::geometry::Shape;
 use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
@@ -36,52 +36,52 @@ use crate::math::{DVec2, DVec3, Vec3};
 use cuboid::BoxEmitter;
 use disk::DiskEmitter;
 use inside::InsideEmitter;
-use mesh::QuadOfTwo;
+use mesh::TrianglePairQuad;
 use quad::QuadEmitter;
-use round::{ConeSide, CylinderSide, RoundEmitter};
-use sheer::SheerEmitter;
+use see_through::SeeThroughEmitter;
 use sphere::SphereEmitter;
+use surface_of_revolution::{ConeSide, CylinderSide, RevolutionEmitter};
 use textured_quad::TexturedQuadEmitter;
 use torus::TorusEmitter;
 use triangle::TriangleEmitter;
 
 /// A shape whose front emits the same radiance in every direction.
 pub trait ShapeEmitter {
-    /// Samples a point of the front that is visible from `point`, by numbers in [0, 1).
+    /// Samples a point on the front that is visible from `point`, with `u` in [0, 1)².
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
-    /// Pdf in sr⁻¹ of [`ShapeEmitter::sample`] at a point of the front that a ray from `from` hits.
+    /// Pdf of [`ShapeEmitter::sample`] in sr⁻¹, for a point on the front that a ray from `from` hits.
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
-    /// Centre of area.
+    /// Centroid of the area.
     fn middle(&self) -> DVec3;
 }
 
-/// A shape that emits from one side, with the same radiance in every direction. A shape that emits from both sides is two lights.
+/// A surface that emits uniformly from one side. A two-sided emitter is two lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
-    /// Emitting shape, with its front on the side that emits.
+    /// The emitting shape; its front is the emitting side.
     pub shape: Emitter,
     /// The side of the object that emits.
     pub side: Side,
     /// Radiance; with a texture, the factor on it.
     pub radiance: Vec3,
-    /// Emission texture, by which the radiance is multiplied from point to point.
+    /// Texture that modulates the radiance.
     pub texture: Option<Box<EmissionTexture>>,
-    /// Number of the object.
+    /// Index of the object.
     pub object: u32,
-    /// Part of the object.
-    pub part: Part,
-    /// Bounds on the light's position, directions and power.
+    /// Which part of the object emits.
+    pub part: LightPart,
+    /// Bounds of the light's position, directions and power.
     pub bounds: LightBounds,
 }
 
-/// Part of an object that a light is.
+/// The part of an object that a light covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// All of it.
+pub enum LightPart {
+    /// The entire object.
     Whole,
-    /// The triangles that the emitter lists.
+    /// The triangles listed by the emitter.
     Listed,
 }
 
@@ -94,14 +94,14 @@ pub enum Side {
     Back,
 }
 
-/// The shapes that can emit.
+/// Any shape that can emit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Emitter {
     /// A sphere.
     Sphere(SphereEmitter),
     /// A parallelogram.
     Quad(QuadEmitter),
-    /// A parallelogram that is sampled by its emission texture.
+    /// A parallelogram sampled according to its emission texture.
     TexturedQuad(Box<TexturedQuadEmitter>),
     /// A box.
     Box(BoxEmitter),
@@ -110,20 +110,20 @@ pub enum Emitter {
     /// A disk.
     Disk(DiskEmitter),
     /// A cylinder.
-    Cylinder(Box<RoundEmitter<CylinderSide>>),
+    Cylinder(Box<RevolutionEmitter<CylinderSide>>),
     /// A cone.
-    Cone(Box<RoundEmitter<ConeSide>>),
+    Cone(Box<RevolutionEmitter<ConeSide>>),
     /// A torus.
     Torus(TorusEmitter),
     /// The inside of a shape.
     Inside(Box<InsideEmitter>),
-    /// A side of a shape that lets light pass, whose near parts do not hide the others.
-    Sheer(Box<SheerEmitter>),
+    /// One side of a see-through shape, whose near parts do not occlude the far ones.
+    SeeThrough(Box<SeeThroughEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
 
-/// Calls the same method of an emitter of any shape; a mesh has an arm of its own, as its triangles may have lights of their own.
+/// Calls the same method for any shape. Meshes need an arm of their own because their triangles are separate primitives.
 macro_rules! of_any {
     ($emitter:expr, $it:ident => $asked:expr, $mesh:ident => $of_mesh:expr) => {
         match $emitter {
@@ -137,7 +137,7 @@ macro_rules! of_any {
             Emitter::Cone($it) => $asked,
             Emitter::Torus($it) => $asked,
             Emitter::Inside($it) => $asked,
-            Emitter::Sheer($it) => $asked,
+            Emitter::SeeThrough($it) => $asked,
             Emitter::Mesh($mesh) => $of_mesh,
         }
     };
@@ -156,17 +156,17 @@ impl Emitter {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The quad on which its points are sampled, and the pair of triangles that forms the quad, if it is one.
+    /// The quad to sample, and the triangle pair that forms it, if any. `None` for other shapes.
     #[inline(always)]
-    pub fn as_quad(&self) -> Option<(&QuadEmitter, Option<&QuadOfTwo>)> {
+    pub fn as_quad(&self) -> Option<(&QuadEmitter, Option<&TrianglePairQuad>)> {
         if let Self::Quad(quad) = self {
             return Some((quad, None));
         }
-        self.as_mesh().and_then(MeshEmitter::quad_of_two).map(|two| (two.quad(), Some(two)))
+        self.as_mesh().and_then(MeshEmitter::triangle_pair).map(|two| (two.quad(), Some(two)))
     }
 }
 
-/// The light of the front of a shape that emits all over. `None` if the shape is infinite, or has no area.
+/// The light on the front of an emitting shape. `None` if the shape is infinite or has no area.
 pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let emitter = match shape {
         Shape::Sphere(sphere) => {
@@ -177,21 +177,21 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Box(cuboid) => Emitter::Box(BoxEmitter::new(cuboid)),
         Shape::Triangle(triangle) => Emitter::Triangle(TriangleEmitter::new(triangle)?),
         Shape::Disk(disk) => Emitter::Disk(DiskEmitter::new(disk)),
-        Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RoundEmitter::of_cylinder(cylinder))),
-        Shape::Cone(cone) => Emitter::Cone(Box::new(RoundEmitter::of_cone(cone))),
+        Shape::Cylinder(cylinder) => Emitter::Cylinder(Box::new(RevolutionEmitter::of_cylinder(cylinder))),
+        Shape::Cone(cone) => Emitter::Cone(Box::new(RevolutionEmitter::of_cone(cone))),
         Shape::Torus(torus) => Emitter::Torus(TorusEmitter::new(*torus)),
         Shape::Plane(_) => return None,
     };
     let bounds = bounds(shape, radiance)?;
-    let (side, texture, part) = (Side::Front, None, Part::Whole);
+    let (side, texture, part) = (Side::Front, None, LightPart::Whole);
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
 }
 
-/// The light of a side of a shape that emits all over, and which light may pass. `None` if the shape is infinite, or has no area.
-pub fn sheer_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
+/// The light on one side of an emitting shape that is see-through. `None` if the shape is infinite or has no area.
+pub fn see_through_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let hides_itself = match (shape, side) {
         (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
-        // From outside, each place of their front is alone in its direction.
+        // Seen from outside, at most one point of the front is in each direction.
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Front) => false,
         (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Back) => true,
         (Shape::Torus(_), _) => true,
@@ -200,14 +200,14 @@ pub fn sheer_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Op
         Side::Front => area_light(shape, radiance, object)?,
         Side::Back => back_light(shape, radiance, object)?,
     };
-    let sheer = if hides_itself { SheerEmitter::new(shape, side) } else { None };
-    Some(match sheer {
-        Some(sheer) => AreaLight { shape: Emitter::Sheer(Box::new(sheer)), ..light },
+    let see_through = if hides_itself { SeeThroughEmitter::new(shape, side) } else { None };
+    Some(match see_through {
+        Some(see_through) => AreaLight { shape: Emitter::SeeThrough(Box::new(see_through)), ..light },
         None => light,
     })
 }
 
-/// The light of the back of a shape that emits all over. `None` if the shape is infinite, or has no area.
+/// The light on the back of an emitting shape. `None` if the shape is infinite or has no area.
 pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let turned = match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
@@ -224,8 +224,8 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
-/// Bounds of a shape's emission. `None` if the shape is infinite. Flat shapes emit by the cosine. Others emit a quarter of their
-/// area times the radiance in any direction, which is the mean over directions for a convex shape (Cauchy).
+/// Bounds of a shape's emission. `None` if the shape is infinite. Flat shapes emit with the cosine. Others are taken to emit a
+/// quarter of their area times the radiance in every direction, which is the mean over directions for convex shapes (Cauchy).
 fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     let normal = match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
@@ -243,14 +243,14 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
         Some(normal) => (area, EmissionCone::of_front(normal)),
         None => (0.25 * area, EmissionCone::ALL),
     };
-    Some(LightBounds::in_box(shape.bounds()?, strength(radiance) * shown, cone))
+    Some(LightBounds::in_box(shape.bounds()?, mean_channel(radiance) * shown, cone))
 }
 
 impl AreaLight {
-    /// The light with an emission texture, by which a quad is sampled as well.
+    /// Adds an emission texture. A quad is then also sampled according to it.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
         if let (Emitter::Quad(quad), true) = (&self.shape, texture.has_places()) {
-            // The edges of a back are in the other order.
+            // For the back, the edges are swapped.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
                 Side::Back => [v, u],
@@ -267,11 +267,13 @@ impl AreaLight {
 
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let sample = self.plain_sample(point, normal, u)?;
-        let (Some(texture), End::At(target)) = (&self.texture, sample.end) else { return Some(sample) };
+        let sample = self.sample_untextured(point, normal, u)?;
+        let (Some(texture), ShadowRayEnd::At(target)) = (&self.texture, sample.end) else {
+            return Some(sample);
+        };
         let primitive = match sample.source {
-            Source::Primitive(_, primitive) => primitive,
-            Source::Object(_) | Source::Sheer(_) | Source::Nothing => 0,
+            LightObject::Primitive(_, primitive) => primitive,
+            LightObject::Object(_) | LightObject::SeeThrough(_) | LightObject::Nothing => 0,
         };
         Some(LightSample {
             weight: sample.weight * texture.at(target, primitive, sample.direction),
@@ -279,12 +281,12 @@ impl AreaLight {
         })
     }
 
-    /// [`AreaLight::sample`] without its emission texture.
+    /// [`AreaLight::sample`] without the emission texture.
     #[inline]
-    pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    pub fn sample_untextured(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (End::At(target), self.source());
+            let (end, source) = (ShadowRayEnd::At(target), self.source());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
@@ -292,10 +294,10 @@ impl AreaLight {
             mesh => mesh.sample(point, normal, u, (self.radiance, self.object)))
     }
 
-    /// The part of the scene that the samples lie on.
-    pub(super) fn source(&self) -> Source {
-        let is_sheer = matches!(self.shape, Emitter::Sheer(_));
-        if is_sheer { Source::Sheer(self.object) } else { Source::Object(self.object) }
+    /// The geometry that the light consists of.
+    pub(super) fn source(&self) -> LightObject {
+        let is_sheer = matches!(self.shape, Emitter::SeeThrough(_));
+        if is_sheer { LightObject::SeeThrough(self.object) } else { LightObject::Object(self.object) }
     }
 
     /// [`Light::pdf`](super::Light::pdf).
@@ -310,7 +312,7 @@ impl AreaLight {
         of_any!(&self.shape, it => it.pdf(from, met), mesh => mesh.pdf(from, normal, met))
     }
 
-    /// Centre of area.
+    /// Centroid of the area.
     pub fn middle(&self) -> DVec3 {
         of_any!(&self.shape, it => it.middle(), mesh => mesh.middle())
     }

@@ -1,4 +1,4 @@
-//! Quad lights: rectangles are sampled by solid angle, other parallelograms and distant ones by area.
+//! Quad lights: rectangles are sampled by solid angle, other parallelograms and distant rectangles by area.
 
 use std::f32::consts::PI;
 
@@ -7,11 +7,11 @@ use super::{LightHit, ShapeEmitter};
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
-/// Least solid angle in sr for sampling by it. Below, the sum of four angles has lost too many digits, and sampling by
-/// area is as good.
-const LEAST_SOLID_ANGLE: f32 = 0.02;
+/// Minimum solid angle in sr for solid-angle sampling. Below it, the sum of four angles has lost too many digits, and area
+/// sampling is as good.
+const MIN_SOLID_ANGLE: f32 = 0.02;
 
-/// A parallelogram that emits along u × v.
+/// A parallelogram that emits toward u × v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadEmitter {
     corner: DVec3,
@@ -20,12 +20,12 @@ pub struct QuadEmitter {
     /// Unit normal of the emitting side.
     normal: Vec3,
     area: f32,
-    /// Lengths and unit directions of the edges. `None` if they are not perpendicular.
-    rectangle: Option<Rectangle>,
+    /// Lengths and unit directions of the edges, if they are perpendicular.
+    rectangle: Option<PlanarRectangle>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Rectangle {
+struct PlanarRectangle {
     x: Vec3,
     y: Vec3,
     width: f32,
@@ -33,7 +33,7 @@ struct Rectangle {
 }
 
 impl ShapeEmitter for QuadEmitter {
-    /// Samples a rectangle by solid angle, another parallelogram by area.
+    /// Samples rectangles by solid angle and other parallelograms by area.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         self.sample_from(point, self.corner_from(point), u)
@@ -53,7 +53,7 @@ impl ShapeEmitter for QuadEmitter {
 }
 
 impl QuadEmitter {
-    /// [`ShapeEmitter::sample`] from a point with this offset to the corner.
+    /// [`ShapeEmitter::sample`], given the offset from the point to the corner.
     #[inline(always)]
     pub(super) fn sample_from(&self, point: Vec3, to_corner: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let by_area = self.by_area(to_corner, u);
@@ -75,11 +75,11 @@ impl QuadEmitter {
         LightSamplePoint { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
-    /// A quad from a corner and two edges that are not parallel.
+    /// A quad from a corner and two nonparallel edges.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let perpendicular = u.dot(v).abs() <= 1e-6 * u.length() * v.length();
-        let rectangle = perpendicular.then(|| Rectangle {
+        let rectangle = perpendicular.then(|| PlanarRectangle {
             x: u.normalize().as_vec3(),
             y: v.normalize().as_vec3(),
             width: u.length() as f32,
@@ -101,14 +101,14 @@ impl QuadEmitter {
         (self.corner - point.as_dvec3()).as_vec3()
     }
 
-    /// Offset from the point to a point uniform over the area, and the inverse pdf as solid angle.
+    /// Samples uniformly over the area; returns the offset from the point and the inverse solid-angle pdf.
     #[inline(always)]
     pub(super) fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
         (offset, self.projected_solid_angle(offset))
     }
 
-    /// Solid angle that the quad would fill if all of it were at this offset from the point; not above 0 from behind.
+    /// Solid angle of the quad if all of it were at this offset from the point; not positive from behind.
     #[inline(always)]
     pub(super) fn projected_solid_angle(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
@@ -116,14 +116,14 @@ impl QuadEmitter {
         height * nearness * nearness * nearness
     }
 
-    /// Pdf in sr⁻¹ of samples by solid angle, from the front. `None` if the quad is sampled by area.
+    /// Pdf of solid-angle sampling in sr⁻¹, for points in front. `None` if the quad is sampled by area.
     #[inline(always)]
     pub(super) fn density(&self, to_corner: Vec3) -> Option<f32> {
         let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
         spherical.filter(SphericalRectangle::is_accurate).map(|spherical| 1.0 / spherical.solid_angle)
     }
 
-    /// Vectors whose products with an offset from the corner are its coordinates along the edges.
+    /// Vectors whose dot products with an offset from the corner are its coordinates along the edges.
     pub(super) fn along(&self) -> [Vec3; 2] {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
@@ -131,8 +131,8 @@ impl QuadEmitter {
     }
 }
 
-/// A rectangle on the sphere of directions (Ureña, Fajardo, King, *An Area-Preserving Parametrization for Spherical
-/// Rectangles*, 2013): its sides along x and y, its plane at z < 0.
+/// A spherical rectangle (Ureña, Fajardo, King, *An Area-Preserving Parametrization for Spherical Rectangles*, 2013). Its sides
+/// are parallel to x and y, and its plane is at z < 0.
 #[derive(Clone, Copy, Debug)]
 pub struct SphericalRectangle {
     x: [f32; 2],
@@ -146,7 +146,7 @@ pub struct SphericalRectangle {
     solid_angle: f32,
 }
 
-impl Rectangle {
+impl PlanarRectangle {
     #[inline(always)]
     fn seen_from(&self, to_corner: Vec3, normal: Vec3) -> SphericalRectangle {
         let (x0, y0, z) = (to_corner.dot(self.x), to_corner.dot(self.y), to_corner.dot(normal));
@@ -154,7 +154,7 @@ impl Rectangle {
     }
 }
 
-/// Component along the plane of the unit vector from a line towards a side; `d2` is the squared distance of the line.
+/// In-plane component of the unit vector from a line toward a side; `d2` is the squared distance of the line.
 #[inline(always)]
 fn towards(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
@@ -167,7 +167,7 @@ fn angle(a: f32, b: f32) -> f32 {
 }
 
 impl SphericalRectangle {
-    /// A rectangle between coordinates, in a plane at z.
+    /// A rectangle with these coordinate ranges, in a plane at z.
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
@@ -186,7 +186,7 @@ impl SphericalRectangle {
         }
     }
 
-    /// Chooses each number among those of three rectangles.
+    /// Combines three rectangles field by field; `of` chooses among their values.
     #[inline(always)]
     pub fn each(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
         Self {
@@ -206,13 +206,13 @@ impl SphericalRectangle {
         self.solid_angle
     }
 
-    /// Coordinate z of its plane.
+    /// The z coordinate of its plane.
     #[inline(always)]
     pub fn z(&self) -> f32 {
         self.z
     }
 
-    /// A point uniform over the area, and the inverse pdf as solid angle.
+    /// Samples uniformly over the area; returns the point and the inverse solid-angle pdf.
     #[inline(always)]
     pub fn by_area(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let (width, height) = (self.x[1] - self.x[0], self.y[1] - self.y[0]);
@@ -221,25 +221,25 @@ impl SphericalRectangle {
         (x, y, -self.z * width * height * (nearness * nearness * nearness))
     }
 
-    /// Whether the solid angle has kept its digits.
+    /// Whether the solid angle has retained enough digits.
     #[inline(always)]
     pub fn is_accurate(&self) -> bool {
-        self.solid_angle >= LEAST_SOLID_ANGLE
+        self.solid_angle >= MIN_SOLID_ANGLE
     }
 
-    /// Coordinates of a point, uniform over the solid angle.
+    /// Samples a point uniformly over the solid angle.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> [f32; 2] {
-        // A slice of the sphere up to x takes its share of the solid angle.
+        // The slice of the rectangle up to x has the fraction u₀ of the solid angle.
         let (sin, cos) = sin_cos(u[0] * self.solid_angle + self.start);
-        // Take sin² of the angle of the lower plane.
+        // sin² of the angle of the lower plane.
         let tilt = 1.0 - self.lower * self.lower;
-        // Along the slice x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
+        // Along the slice, x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
         let slope = cos * self.lower - self.upper;
         let sin = if slope < 0.0 { -sin } else { sin };
         let root = (slope * slope - tilt * (sin * sin)).max(f32::MIN_POSITIVE).sqrt();
         let x = (-self.z * sin / root).max(self.x[0]).min(self.x[1]);
-        // There, heights on the unit circle are uniform.
+        // At that x, heights on the unit circle are uniform.
         let d2 = x * x + self.z * self.z;
         let (h0, h1) = (towards(self.y[0], d2), towards(self.y[1], d2));
         let h = h0 + u[1] * (h1 - h0);

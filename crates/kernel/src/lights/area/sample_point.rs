@@ -1,15 +1,15 @@
-//! Samples of points on lights.
+//! A sampled point on an area light.
 
 use crate::math::Vec3;
 
-/// A sample of a point on a light, computed without branches.
+/// A sampled point on an area light, computed without branches.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSamplePoint {
     /// Unit direction to the sampled point.
     pub direction: Vec3,
     /// Sampled point.
     pub target: Vec3,
-    /// Inverse pdf of the direction, in sr; 0 from behind or from inside the light.
+    /// Inverse pdf of the direction in sr; 0 from behind or from inside the light.
     pub factor: f32,
 }
 

@@ -8,18 +8,18 @@ use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
-/// A sphere that shines outwards.
+/// A sphere that emits outward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereEmitter {
-    /// Centre.
+    /// Center.
     pub center: DVec3,
     /// Radius.
     pub radius: f64,
 }
 
 impl ShapeEmitter for SphereEmitter {
-    /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exactly for
-    /// narrow cones too.
+    /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), accurately even for narrow
+    /// cones.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (axis, distance, sin2_max) = self.cone_around(point);
@@ -27,7 +27,7 @@ impl ShapeEmitter for SphereEmitter {
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
         let one_minus_cos_max = one_minus_cos(sin2_max);
         let local = warp::cone(u, one_minus_cos_max);
-        // The near root along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
+        // The near intersection along a direction at angle θ from the axis: d·cos θ − √(R² − d²·sin²θ).
         let sin2 = local.x * local.x + local.y * local.y;
         let depth = (sin2_max - sin2).max(0.0).sqrt();
         let direction = Frame::from_normal(axis).to_world(local);
@@ -39,7 +39,7 @@ impl ShapeEmitter for SphereEmitter {
         }
     }
 
-    /// The same in all directions that hit the sphere.
+    /// The pdf is the same for all directions that hit the sphere.
     fn pdf(&self, from: Vec3, _: &LightHit) -> f32 {
         self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
     }
@@ -50,12 +50,12 @@ impl ShapeEmitter for SphereEmitter {
 }
 
 impl SphereEmitter {
-    /// Unit direction to the centre, distance, and sin² of the half angle. `None` from inside.
+    /// Unit direction to the center, distance, and sin² of the half angle. `None` from inside.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         Some(self.cone_around(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
     }
 
-    /// [`SphereEmitter::cone`]; from inside, with a sine that no angle has.
+    /// Like [`SphereEmitter::cone`], but from inside it returns a sin² of at least 1.
     #[inline(always)]
     fn cone_around(&self, point: Vec3) -> (Vec3, f32, f32) {
         let to_center = self.center - point.as_dvec3();

@@ -1,43 +1,43 @@
-//! Textured quad lights, sampled by their emission texture as well as by solid angle.
+//! Textured quad lights, sampled according to their emission texture as well as by solid angle.
 
 use super::quad::QuadEmitter;
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter};
-use crate::lights::tree::bounds::strength;
+use crate::lights::tree::bounds::mean_channel;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 
-/// A parallelogram with an emission texture. A fraction of the samples is chosen by the texture, the others by the solid
-/// angle. Their pdf is the mean of both (the balance heuristic for one sample: Veach, *Robust Monte Carlo Methods for Light
-/// Transport Simulation*, 1997, section 9.2.4).
+/// A parallelogram with an emission texture. A fraction of the samples is distributed according to the texture, the rest by solid
+/// angle. Their pdf combines both (one-sample balance heuristic: Veach, *Robust Monte Carlo Methods for Light Transport
+/// Simulation*, 1997, section 9.2.4).
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexturedQuadEmitter {
     quad: QuadEmitter,
-    /// Number of cells along both edges.
+    /// Number of cells along each edge.
     size: [usize; 2],
     /// Brightness of the cells.
     cells: PiecewiseConstant2D,
-    /// Fraction of the samples that the texture chooses.
+    /// Fraction of the samples distributed according to the texture.
     share: f32,
-    /// The products of these and a point's offset from the corner are its coordinates along the edges.
+    /// Dot products of these with a point's offset from the corner are its coordinates along the edges.
     along: [Vec3; 2],
 }
 
-/// Most cells along an edge.
-const MOST_CELLS: usize = 256;
+/// Maximum number of cells along an edge.
+const MAX_CELLS: usize = 256;
 
-/// Least and greatest number of look-ups in a cell along an edge.
+/// Minimum and maximum number of texture lookups per cell along each edge.
 const LOOKUPS: (usize, usize) = (2, 4);
 
-/// Largest fraction of the samples that a texture chooses: the texture ignores distances.
-const MOST_BY_PICTURE: f64 = 0.9;
+/// Maximum fraction of texture samples: the texture does not account for distances.
+const MAX_TEXTURE_SHARE: f64 = 0.9;
 
 impl ShapeEmitter for TexturedQuadEmitter {
-    /// Samples by the texture or by the solid angle.
+    /// Samples according to the texture or by solid angle.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let by_picture = u[0] < self.share;
-        let (before, share) = if by_picture { (0.0, self.share) } else { (self.share, 1.0 - self.share) };
+        let by_texture = u[0] < self.share;
+        let (before, share) = if by_texture { (0.0, self.share) } else { (self.share, 1.0 - self.share) };
         let rest = (u[0] - before) / share;
         const LAST: f32 = 1.0_f32.next_down();
         let u = [if rest < LAST { rest } else { LAST }, u[1]];
@@ -46,12 +46,12 @@ impl ShapeEmitter for TexturedQuadEmitter {
         let at =
             [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
         let (offset, by_area) = self.quad.by_area(to_corner, at);
-        let of_cell = self.cell_density(column, row);
+        let cell_factor = self.cell_density(column, row);
         let own = self.quad.sample(point, u);
-        if by_picture {
+        if by_texture {
             let direction = offset * (1.0 / offset.length_squared().sqrt());
-            let of_quad = self.quad.density(to_corner).unwrap_or(1.0 / by_area);
-            let density = self.share * of_cell / by_area + (1.0 - self.share) * of_quad;
+            let quad_pdf = self.quad.density(to_corner).unwrap_or(1.0 / by_area);
+            let density = self.share * cell_factor / by_area + (1.0 - self.share) * quad_pdf;
             let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
             return LightSamplePoint { direction, target: point + offset, factor };
         }
@@ -64,8 +64,8 @@ impl ShapeEmitter for TexturedQuadEmitter {
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let to_corner = self.quad.corner_from(from);
-        let of_quad = self.quad.pdf(from, met);
-        if of_quad > 0.0 { self.density(met.direction * met.distance, to_corner, of_quad) } else { 0.0 }
+        let quad_pdf = self.quad.pdf(from, met);
+        if quad_pdf > 0.0 { self.density(met.direction * met.distance, to_corner, quad_pdf) } else { 0.0 }
     }
 
     fn middle(&self) -> DVec3 {
@@ -74,10 +74,10 @@ impl ShapeEmitter for TexturedQuadEmitter {
 }
 
 impl TexturedQuadEmitter {
-    /// An emitter from the colours at places along both edges, in [0, 1], with so many texels along the edges. `None` if
-    /// the texture has too little contrast.
+    /// Creates an emitter from colors at positions in [0, 1]² along the edges, with `texels` texels along each edge. Returns
+    /// `None` if the texture has too little contrast.
     pub fn new(quad: QuadEmitter, texels: [f64; 2], color: impl Fn([f64; 2]) -> Vec3) -> Option<Self> {
-        let size = texels.map(|count| (count.ceil() as usize).clamp(1, MOST_CELLS));
+        let size = texels.map(|count| (count.ceil() as usize).clamp(1, MAX_CELLS));
         let lookups: [usize; 2] = std::array::from_fn(|i| {
             ((texels[i] / size[i] as f64).ceil() as usize).clamp(LOOKUPS.0, LOOKUPS.1)
         });
@@ -87,7 +87,7 @@ impl TexturedQuadEmitter {
                 let at = |axis: usize, k: usize| {
                     (cell[axis] as f64 + (k as f64 + 0.5) / lookups[axis] as f64) / size[axis] as f64
                 };
-                sum += strength(color([at(0, i), at(1, j)])).max(0.0);
+                sum += mean_channel(color([at(0, i), at(1, j)])).max(0.0);
             }
             sum
         };
@@ -95,26 +95,27 @@ impl TexturedQuadEmitter {
         let rows: Vec<Vec<f64>> = (0..size[1]).map(row).collect();
         let (sum, squares) =
             rows.iter().flatten().fold((0.0, 0.0), |(sum, squares), one| (sum + one, squares + one * one));
-        // Divide the variance of the brightness by the mean of its square: 0 if the brightness is constant.
+        // Variance of the brightness divided by the mean of its square; 0 for constant brightness.
         let contrast = 1.0 - sum * sum / (squares * (size[0] * size[1]) as f64);
-        let share = (MOST_BY_PICTURE * contrast) as f32;
-        let cells = PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > LEAST_SHARE)?;
+        let share = (MAX_TEXTURE_SHARE * contrast) as f32;
+        let cells =
+            PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > MIN_TEXTURE_SHARE)?;
         Some(Self { along: quad.along(), quad, size, cells, share })
     }
 
-    /// Pdf in sr⁻¹ at an offset from the point, given the pdf of the quad alone.
+    /// Pdf in sr⁻¹ at an offset from the point, given the pdf of the quad without its texture.
     #[inline(always)]
-    fn density(&self, offset: Vec3, to_corner: Vec3, of_quad: f32) -> f32 {
+    fn density(&self, offset: Vec3, to_corner: Vec3, quad_pdf: f32) -> f32 {
         let on_quad = offset - to_corner;
         let cell = |axis: usize| {
             let place = self.along[axis].dot(on_quad) * self.size[axis] as f32;
             (if place > 0.0 { place as usize } else { 0 }).min(self.size[axis] - 1)
         };
-        let of_cell = self.cell_density(cell(0), cell(1));
-        self.share * of_cell / self.quad.projected_solid_angle(offset) + (1.0 - self.share) * of_quad
+        let cell_factor = self.cell_density(cell(0), cell(1));
+        self.share * cell_factor / self.quad.projected_solid_angle(offset) + (1.0 - self.share) * quad_pdf
     }
 
-    /// Density of a cell over the area, relative to that of a constant texture.
+    /// Area density of a cell, relative to a constant texture.
     #[inline(always)]
     fn cell_density(&self, column: usize, row: usize) -> f32 {
         let probability = self.cells.row_probability(row) * self.cells.column_probability(row, column);
@@ -122,5 +123,5 @@ impl TexturedQuadEmitter {
     }
 }
 
-/// Least fraction; textures with less contrast are not worth a look-up.
-const LEAST_SHARE: f32 = 0.05;
+/// Minimum fraction; textures with less contrast are not worth a lookup.
+const MIN_TEXTURE_SHARE: f32 = 0.05;

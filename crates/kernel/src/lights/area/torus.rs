@@ -1,10 +1,11 @@
-//! Torus lights: sampled by slices around the axis, and in each by the part of the tube's circle that faces the point.
+//! Torus lights, sampled in slices around the axis and, within each slice, over the part of the tube's circle that faces the
+//! point.
 
 use std::f64::consts::PI;
 
 use super::disk::perpendicular;
-use super::linear::Linear;
-use super::meridians::Turn;
+use super::meridians::SinCos;
+use super::piecewise_linear::PiecewiseLinear;
 use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter};
 use crate::geometry::RayF64;
@@ -12,7 +13,7 @@ use crate::geometry::torus::Torus;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};
 
-/// A torus that emits outwards.
+/// A torus that emits outward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorusEmitter {
     torus: Torus,
@@ -21,75 +22,77 @@ pub struct TorusEmitter {
 /// Number of slices at which the density is evaluated.
 const SLICES: usize = 7;
 
-/// Number of places of a slice's circle at which the density is evaluated.
+/// Number of points on a slice's circle at which the density is evaluated.
 const PLACES: usize = 5;
 
-/// Least closeness; seen from the axis, all slices are alike.
-const LEAST_CLOSENESS: f64 = 0.01;
+/// Minimum closeness. On the axis, where it would be 0, all slices look the same.
+const MIN_CLOSENESS: f64 = 0.01;
 
-/// A torus relative to a point outside.
+/// A torus seen from a point outside it.
 ///
-/// A slice through the axis stands at an angle φ from the point. Its parameter is τ with closeness·φ = sinh τ: near the point,
-/// slices are as dense as its distance requires; farther away they are even in the logarithm of their distance. The visible
-/// part of a slice's circle is bounded by tangents from the point's foot in the slice's plane. If there were a plane in its
-/// place, sines of elevations would be uniform.
-struct View {
+/// A slice is a half plane through the axis at an angle φ from the point. Its parameter τ satisfies closeness·φ = sinh τ: near
+/// the point, slices are as dense as its distance requires; farther away, they are uniform in the logarithm of their distance.
+/// The visible part of a slice's circle is bounded by the tangents from the point's projection onto the slice's plane (its foot).
+/// If the circle were replaced by a plane, sines of elevations would be uniform.
+struct TorusView {
     point: DVec3,
-    /// Unit vectors: towards the point from the axis, along the axis, and across.
+    /// Unit vectors: from the axis toward the point, along the axis, and perpendicular to both.
     out: DVec3,
     axis: DVec3,
     across: DVec3,
-    /// Distance of the point from the axis, and height above the plane of the circle.
+    /// Distance of the point from the axis, and height above the plane of the tube's center circle.
     distance: f64,
     height: f64,
     radius: f64,
     tube: f64,
-    /// √(distance·radius) in units of the point's distance from the surface.
+    /// √(distance·radius) relative to the point's distance from the surface.
     closeness: f64,
-    /// The greatest τ.
+    /// The largest τ.
     reach: f64,
 }
 
-/// Visible part of a slice: all lengths in its plane, from the foot of the point there.
-struct Slice {
-    /// Sine and cosine of the angle φ.
-    turn: Turn,
+/// The visible part of a slice. All lengths are in the slice's plane, relative to the foot of the point.
+struct TorusSlice {
+    /// Sine and cosine of φ.
+    turn: SinCos,
     /// Distance from the axis to the foot.
     foot: f64,
-    /// Distance from the plane to the point.
+    /// Distance from the point to the plane.
     off: f64,
-    /// Direction to the circle's middle as (outwards, along the axis).
+    /// Direction to the circle's center, as (outward, along the axis).
     to_middle: [f64; 2],
-    /// Nearest distance, and the product of both distances along any line through the foot.
+    /// Smallest distance to the circle, and the power of the foot (the product of both distances along any line through it).
     gap: f64,
     power: f64,
-    /// The greatest sine of elevation.
+    /// The largest sine of the elevation.
     sine: f64,
 }
 
-/// Relative difference of distances that are equal within rounding.
-const SAME_PLACE: f64 = 1e-3;
+/// Relative tolerance for equal distances.
+const SAME_DISTANCE: f64 = 1e-3;
 
-/// A point of a slice's circle.
-struct Place {
-    /// Offset from the foot, outwards and along the axis.
+/// A point on a slice's circle.
+struct SlicePoint {
+    /// Offset from the foot, outward and along the axis.
     outwards: f64,
     upwards: f64,
-    /// Solid angle per φ and per sine, the sine in units of the greatest one.
+    /// Solid angle per unit of φ and of the sine, as a fraction of the largest sine.
     factor: f64,
 }
 
 impl ShapeEmitter for TorusEmitter {
-    /// Samples a direction whose first hit on the torus faces the point. If a direction hits it twice, both hits count for its
-    /// pdf, so that no sample is occluded.
+    /// Samples a direction whose first hit on the torus faces the point. If a direction enters the torus twice, its pdf includes
+    /// both hits, so that no sample is occluded.
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let Some(view) = View::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
+        let Some(view) = TorusView::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
         let slices = view.slices();
         let side = 2.0 * f64::from(u[0]) - 1.0;
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
         let turn = libm::sinh(tau) / view.closeness;
-        let Some(slice) = view.slice(Turn::of(turn.copysign(side))) else { return LightSamplePoint::NOTHING };
+        let Some(slice) = view.slice(SinCos::of(turn.copysign(side))) else {
+            return LightSamplePoint::NOTHING;
+        };
         let (sine, in_slice) = slice.sines(&view).sample(f64::from(u[1]));
         let place = slice.place(&view, slice.tangent(2.0 * sine - 1.0));
         let own = view.per_turn(density, tau) * 0.5 * in_slice / place.factor;
@@ -99,7 +102,7 @@ impl ShapeEmitter for TorusEmitter {
         let offset = view.offset(&slice, &place);
         let direction = offset.normalize();
         let (densities, first) = view.densities(&self.torus, &slices, direction);
-        // A line that grazes the torus may miss it by rounding.
+        // A grazing ray may miss the torus due to rounding.
         let (density, distance) =
             first.map_or((own, offset.length()), |first| (densities.max(0.5 * own), first));
         let direction = direction.as_vec3();
@@ -111,11 +114,11 @@ impl ShapeEmitter for TorusEmitter {
     }
 
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        View::new(&self.torus, from).map_or(0.0, |view| {
+        TorusView::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slices();
             let (density, first) = view.densities(&self.torus, &slices, met.direction.as_dvec3());
-            // A ray that passes the first place straight on finds another one, which no sample does.
-            let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_PLACE));
+            // A ray that passes through the first surface finds another one, which is never sampled.
+            let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_DISTANCE));
             if is_later { 0.0 } else { density as f32 }
         })
     }
@@ -126,13 +129,13 @@ impl ShapeEmitter for TorusEmitter {
 }
 
 impl TorusEmitter {
-    /// The emitter of a whole torus.
+    /// The emitter of an entire torus.
     pub fn new(torus: Torus) -> Self {
         Self { torus }
     }
 }
 
-impl View {
+impl TorusView {
     fn new(torus: &Torus, point: Vec3) -> Option<Self> {
         let (center, axis) = (torus.centroid(), torus.axis());
         let (radius, tube) = torus.radii();
@@ -147,9 +150,9 @@ impl View {
         if !(gap > 0.0) {
             return None;
         }
-        let closeness = ((distance * radius).sqrt() / gap).max(LEAST_CLOSENESS);
-        // From between the planes of its top and its bottom, outside of the ring, the ring's far side is invisible, and its
-        // near side is visible up to the circles' reach.
+        let closeness = ((distance * radius).sqrt() / gap).max(MIN_CLOSENESS);
+        // Between the planes of its top and bottom and outside the ring, the far side of the ring is invisible, and its near side
+        // is visible up to the reach of the circles.
         let is_beside = height.abs() < tube && beside > 0.0;
         let widest = if is_beside {
             let half = ((tube - height) * (tube + height)).sqrt();
@@ -172,27 +175,28 @@ impl View {
         })
     }
 
-    /// Density of the slices to one side by τ, in units of the greatest τ.
-    fn slices(&self) -> Linear<SLICES> {
-        // sinh and cosh by powers of e^step.
+    /// Density over τ of the slices on one side, with τ relative to its maximum.
+    fn slices(&self) -> PiecewiseLinear<SLICES> {
+        // Compute sinh and cosh from powers of e
+        // step.
         let step = libm::exp(self.reach / (SLICES - 1) as f64);
         let mut power = 1.0;
-        Linear(std::array::from_fn(|_| {
+        PiecewiseLinear(std::array::from_fn(|_| {
             let (sinh, cosh) = (0.5 * (power - 1.0 / power), 0.5 * (power + 1.0 / power));
             power *= step;
             let (sin, cos) = sin_cos((sinh / self.closeness) as f32);
-            let slice = self.slice(Turn { sin: f64::from(sin), cos: f64::from(cos) });
+            let slice = self.slice(SinCos { sin: f64::from(sin), cos: f64::from(cos) });
             slice.map_or(0.0, |slice| slice.place(self, slice.tangent(0.0)).factor) * cosh
         }))
     }
 
-    /// Density by φ, over both sides, from one by τ in units of the greatest τ.
+    /// Converts a density over τ/τ_max on one side to a density over φ on both sides.
     fn per_turn(&self, density: f64, tau: f64) -> f64 {
         0.5 * density * self.closeness / (libm::cosh(tau) * self.reach)
     }
 
     /// The slice at an angle φ. `None` if none of it is visible.
-    fn slice(&self, turn: Turn) -> Option<Slice> {
+    fn slice(&self, turn: SinCos) -> Option<TorusSlice> {
         let foot = self.distance * turn.cos;
         let off = self.distance * turn.sin;
         let beside = self.radius - foot;
@@ -200,7 +204,7 @@ impl View {
         let (gap, power) = (distance - self.tube, (distance - self.tube) * (distance + self.tube));
         let highest = gap * self.tube / power.max(0.0).sqrt();
         let slope = gap * gap + off * off + highest * highest;
-        (gap > 0.0).then(|| Slice {
+        (gap > 0.0).then(|| TorusSlice {
             turn,
             foot,
             off,
@@ -211,27 +215,32 @@ impl View {
         })
     }
 
-    /// Offset from the point to a place.
-    fn offset(&self, slice: &Slice, place: &Place) -> DVec3 {
-        let Turn { sin, cos } = slice.turn;
+    /// Offset from the view point to a point on a slice.
+    fn offset(&self, slice: &TorusSlice, place: &SlicePoint) -> DVec3 {
+        let SinCos { sin, cos } = slice.turn;
         let outwards = self.out * cos + self.across * sin;
         let along = self.across * cos - self.out * sin;
         outwards * place.outwards + self.axis * place.upwards + along * slice.off
     }
 
-    /// Sum of the densities of all places where a direction enters the torus, in sr⁻¹, and the distance to the first one.
-    fn densities(&self, torus: &Torus, slices: &Linear<SLICES>, direction: DVec3) -> (f64, Option<f64>) {
+    /// Sum of the pdfs in sr⁻¹ at all points where a direction enters the torus, and the distance to the first one.
+    fn densities(
+        &self,
+        torus: &Torus,
+        slices: &PiecewiseLinear<SLICES>,
+        direction: DVec3,
+    ) -> (f64, Option<f64>) {
         let ray = RayF64 { origin: self.point, direction, t_max: f64::INFINITY };
         let entries = torus.entries(&ray);
         let sum = entries.iter().flatten().map(|t| self.density(slices, direction * *t)).sum();
         (sum, entries[0])
     }
 
-    /// The density of a place by its offset from the point.
-    fn density(&self, slices: &Linear<SLICES>, offset: DVec3) -> f64 {
+    /// Pdf at a point, given its offset from the view point.
+    fn density(&self, slices: &PiecewiseLinear<SLICES>, offset: DVec3) -> f64 {
         let (x, y) = (self.distance + offset.dot(self.out), offset.dot(self.across));
         let ring = (x * x + y * y).sqrt();
-        let turn = Turn { sin: y / ring, cos: x / ring };
+        let turn = SinCos { sin: y / ring, cos: x / ring };
         let share = libm::asinh(self.closeness * libm::atan2(turn.sin.abs(), turn.cos)) / self.reach;
         let Some(slice) = self.slice(turn).filter(|_| share <= 1.0 + 1e-9) else { return 0.0 };
         let [outwards, upwards] = [ring - slice.foot, offset.dot(self.axis)];
@@ -247,28 +256,28 @@ impl View {
     }
 }
 
-impl Slice {
-    /// Tangent of the angle to the circle's middle, from a sine in units of the greatest.
+impl TorusSlice {
+    /// Tangent of the angle to the circle's center, from a sine relative to the largest.
     fn tangent(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
-    /// Sine in units of the greatest, from a tangent.
+    /// Sine relative to the largest, from a tangent.
     fn sine_of(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
 
-    /// Density of the sines from the least to the greatest.
-    fn sines(&self, view: &View) -> Linear<PLACES> {
+    /// Density of the sines from the smallest to the largest.
+    fn sines(&self, view: &TorusView) -> PiecewiseLinear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
-        Linear(std::array::from_fn(|i| self.place(view, self.tangent(sine(i))).factor))
+        PiecewiseLinear(std::array::from_fn(|i| self.place(view, self.tangent(sine(i))).factor))
     }
 
-    /// The place of the circle at the tangent of an angle to its middle, on the near side.
-    fn place(&self, view: &View, tangent: f64) -> Place {
+    /// The near point of the circle at the tangent of an angle to its center.
+    fn place(&self, view: &TorusView, tangent: f64) -> SlicePoint {
         let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
         let sin = tangent * cos;
         let middle = self.gap + view.tube;
@@ -276,13 +285,14 @@ impl Slice {
         let to_circle = self.power / (middle * cos + half_chord);
         let [u, v] = self.to_middle;
         let (outwards, upwards) = (to_circle * (cos * u - sin * v), to_circle * (cos * v + sin * u));
-        // The solid angle of dη·dφ is ring·D²/d³, d² = D² + off². With y = gap·tan η and its sine of elevation s,
-        // dη = gap·dy/(gap² + y²) and dy = (gap² + off² + y²)^(3/2)/(gap² + off²) ds.
+        // The solid angle of dη·dφ is ring·D²/d³, with d² = D² + off². With y = gap·tan η and its sine of elevation s, dη =
+        // gap·dy/(gap² + y²) and dy = (gap² + off² + y²)
+        // (3/2)/(gap² + off²) ds.
         let (g2, off2) = (self.gap * self.gap, self.off * self.off);
         let (y2, d2) = (g2 * tangent * tangent, to_circle * to_circle);
         let ratio = (g2 + off2 + y2) / (d2 + off2);
         let ring = self.foot + outwards;
         let factor = ring * d2 / (g2 + y2) * (ratio * ratio.sqrt()) * self.gap * self.sine / (g2 + off2);
-        Place { outwards, upwards, factor }
+        SlicePoint { outwards, upwards, factor }
     }
 }

@@ -1,4 +1,4 @@
-//! Single triangles that emit: sampled by solid angle, distant ones by area.
+//! Triangle lights, sampled by solid angle or, if distant, by area.
 
 use std::f64::consts::TAU;
 
@@ -8,13 +8,13 @@ use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;
 
-/// Least solid angle in sr for sampling by it; below, sampling by area is as good.
-const LEAST_SOLID_ANGLE: f64 = 1e-3;
+/// Minimum solid angle in sr for solid-angle sampling; below it, area sampling is as good.
+const MIN_SOLID_ANGLE: f64 = 1e-3;
 
-/// Distance from a half sphere, in sr, within which the corners are on one great circle but for rounding.
+/// Difference from a hemisphere, in sr, at which the corners are on a great circle within rounding.
 const ALMOST_HALF: f64 = 1e-4;
 
-/// A triangle that emits along (b − a) × (c − a).
+/// A triangle that emits toward (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleEmitter {
     corners: [DVec3; 3],
@@ -23,8 +23,8 @@ pub struct TriangleEmitter {
     area: f64,
 }
 
-/// A triangle on the sphere of directions.
-struct Spherical {
+/// A spherical triangle.
+struct SphericalTriangle {
     /// Unit vectors to the corners.
     corners: [DVec3; 3],
     solid_angle: f64,
@@ -68,7 +68,7 @@ impl ShapeEmitter for TriangleEmitter {
 }
 
 impl TriangleEmitter {
-    /// The emitter of a whole triangle. `None` without an area.
+    /// The emitter of an entire triangle. `None` if it has no area.
     pub fn new(triangle: &Triangle) -> Option<Self> {
         let Triangle { a, b, c } = *triangle;
         let normal = (b - a).cross(c - a);
@@ -80,8 +80,8 @@ impl TriangleEmitter {
         })
     }
 
-    /// The triangle relative to a point. `None` from behind.
-    fn seen_from(&self, point: DVec3) -> Option<([DVec3; 3], Spherical)> {
+    /// The triangle seen from a point. `None` from behind.
+    fn seen_from(&self, point: DVec3) -> Option<([DVec3; 3], SphericalTriangle)> {
         let offsets = self.corners.map(|corner| corner - point);
         let corners = offsets.map(DVec3::normalize);
         let [a, b, c] = corners;
@@ -89,32 +89,32 @@ impl TriangleEmitter {
         // tan(Ω/2) (Van Oosterom and Strackee, *The Solid Angle of a Plane Triangle*, 1983).
         let volume = a.dot(b.cross(c)).abs();
         let solid_angle = 2.0 * libm::atan2(volume, 1.0 + a.dot(b) + b.dot(c) + c.dot(a));
-        is_front.then_some((offsets, Spherical { corners, solid_angle }))
+        is_front.then_some((offsets, SphericalTriangle { corners, solid_angle }))
     }
 }
 
-impl Spherical {
+impl SphericalTriangle {
     fn is_accurate(&self) -> bool {
-        (LEAST_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
+        (MIN_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
     }
 
-    /// Samples uniformly over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995): first a corner on the
-    /// side a–c, so that the triangle with a and b has its share of the solid angle, then a point on the side from b to there by
-    /// its height.
+    /// Samples uniformly over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995). First choose a new
+    /// corner on the side a–c such that its triangle with a and b has the required fraction of the solid angle; then choose a
+    /// point on the arc from b to that corner, uniformly in height.
     fn sample(&self, u: [f64; 2]) -> DVec3 {
         let [a, b, c] = self.corners;
-        // The angle at a, between the planes through b and through c.
+        // The angle at a, between the planes through b and c.
         let (to_b, to_c) = (b - a * a.dot(b), c - a * a.dot(c));
         let alpha = libm::atan2(a.dot(to_b.cross(to_c)).abs(), to_b.dot(to_c));
         let (sin_alpha, cos_alpha) = libm::sincos(alpha);
-        // With the angles β at b and γ at the new corner, α + β + γ = π + share. With ψ = share − α and the cosine of the
-        // side a–b, the spherical law of cosines gives the side from a to the new corner.
+        // With the angles β at b and γ at the new corner, α + β + γ = π + share. With ψ = share − α and the cosine of the side
+        // a–b, the spherical law of cosines gives the side from a to the new corner.
         let (sin, cos) = libm::sincos(u[0] * self.solid_angle - alpha);
         let (p, q) = (cos - cos_alpha, sin + sin_alpha * a.dot(b));
         let cos_side = ((q * cos - p * sin) * cos_alpha - q) / ((q * sin + p * cos) * sin_alpha);
         let cos_side = cos_side.clamp(a.dot(c).min(1.0), 1.0);
         let corner = a * cos_side + to_c.normalize() * ((1.0 - cos_side) * (1.0 + cos_side)).sqrt();
-        // Cosines from b to the corner are uniform.
+        // Cosines along the arc from b to the new corner are uniform.
         let from_b = corner - b * b.dot(corner);
         let versine = u[1] * (1.0 - corner.dot(b)).max(0.0);
         let across = (versine * (2.0 - versine)).max(0.0).sqrt();
@@ -129,8 +129,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_octant_has_an_eighth_of_the_sphere_and_its_middle() {
-        let octant = Spherical { corners: [DVec3::X, DVec3::Y, DVec3::Z], solid_angle: PI / 2.0 };
+    fn octant_samples_have_the_exact_mean() {
+        let octant = SphericalTriangle { corners: [DVec3::X, DVec3::Y, DVec3::Z], solid_angle: PI / 2.0 };
         let n = 400;
         let mut sum = DVec3::ZERO;
         for i in 0..n * n {
@@ -139,7 +139,7 @@ mod tests {
             assert!((direction.length() - 1.0).abs() < 1e-12 && direction.min_element() > -1e-12);
             sum += direction / f64::from(n * n);
         }
-        // ∫x over the octant is π/4.
+        // The mean of x over the octant is (π/4) / (π/2).
         assert!((sum - DVec3::splat(0.5)).abs().max_element() < 1e-5, "{sum}");
     }
 }

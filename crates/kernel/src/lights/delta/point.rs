@@ -4,33 +4,33 @@ use std::f64::consts::PI;
 
 use super::DeltaLight;
 use crate::choice;
-use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
+use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
-/// A light without extent, with the same intensity in every direction.
+/// An isotropic point light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
     /// Position.
     pub position: DVec3,
-    /// Intensity in W·sr⁻¹; without fall-off, irradiance at normal incidence.
+    /// Intensity in W·sr⁻¹; without falloff, the irradiance at normal incidence.
     pub intensity: Vec3,
-    /// Fall-off with distance.
+    /// Falloff with distance.
     pub falloff: Falloff,
 }
 
 choice! {
     /// Fall-off of a point light with distance.
     pub enum Falloff {
-        /// With the square of the distance.
+        /// Inverse-square falloff.
         Square = "square",
-        /// Not at all.
+        /// No falloff.
         None = "none",
     }
 }
 
 impl PointLight {
-    /// Unit direction to the light, and irradiance at normal incidence; 0 at the light itself.
+    /// Unit direction to the light, and the irradiance at normal incidence; 0 at the light's own position.
     #[inline(always)]
     pub(super) fn irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
         let to_light = self.position - point.as_dvec3();
@@ -45,7 +45,7 @@ impl PointLight {
 }
 
 impl DeltaLight for PointLight {
-    fn brightest(&self) -> &PointLight {
+    fn isotropic(&self) -> &PointLight {
         self
     }
 
@@ -63,10 +63,10 @@ impl DeltaLight for PointLight {
 
     fn bounds(&self) -> LightBounds {
         let space = match self.falloff {
-            Falloff::Square => Space::Weakening,
-            Falloff::None => Space::Steady,
+            Falloff::Square => DistanceFalloff::InverseSquare,
+            Falloff::None => DistanceFalloff::Constant,
         };
-        let power = strength(self.intensity);
+        let power = mean_channel(self.intensity);
         LightBounds { space, center: self.position, radius: 0.0, power, cone: EmissionCone::ALL }
     }
 

@@ -14,22 +14,22 @@ use crate::sampling::warp;
 pub struct SpotLight {
     /// The same light without the cone.
     pub point: PointLight,
-    /// Unit direction of its axis, away from the light.
+    /// Unit direction of the cone's axis, away from the light.
     pub axis: Vec3,
-    /// Half the angle of the cone, in radians, in (0, π].
+    /// Half the cone's angle in radians, in (0, π].
     pub half_angle: f32,
-    /// Outer fraction of the half angle, in [0, 1], over which it fades linearly in the angle.
+    /// Outer fraction of the half angle, in [0, 1], over which the intensity fades linearly with the angle.
     pub blend: f32,
 }
 
 impl DeltaLight for SpotLight {
-    fn brightest(&self) -> &PointLight {
+    fn isotropic(&self) -> &PointLight {
         &self.point
     }
 
     #[inline(always)]
     fn share(&self, away: Vec3) -> f32 {
-        // Take the sine of half the angle, which is exact even if the cosine of a small angle is not.
+        // Use the sine of half the angle, which is accurate even where the cosine of a small angle is not.
         let half_sine = (away - self.axis).length() * 0.5;
         let half_sine = if half_sine < 1.0 { half_sine } else { 1.0 };
         let angle = 2.0 * (FRAC_PI_2 - acos(half_sine));
@@ -39,15 +39,15 @@ impl DeltaLight for SpotLight {
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
 
-    /// The inner cone of the half angle (1 − blend)·H, and the integral of (H − θ)/(blend·H) over the directions around it.
+    /// The inner cone of half angle (1 − blend)·H, plus the integral of (H − θ)/(blend·H) over the directions around it.
     #[inline]
     fn solid_angle(&self) -> f64 {
-        let Cones { inner, faded, .. } = self.cones();
+        let SpotCone { inner, faded, .. } = self.cones();
         inner + faded
     }
 
     fn direction(&self, u: [f32; 2]) -> Vec3 {
-        let Cones { half, width, inner, faded } = self.cones();
+        let SpotCone { half, width, inner, faded } = self.cones();
         let goal = f64::from(u[0]) * (inner + faded);
         let local = if goal < inner {
             let one_minus_cos = (goal / (2.0 * std::f64::consts::PI)) as f32;
@@ -69,30 +69,30 @@ impl DeltaLight for SpotLight {
 }
 
 impl SpotLight {
-    fn cones(&self) -> Cones {
+    fn cones(&self) -> SpotCone {
         let half = f64::from(self.half_angle);
         let width = f64::from(self.blend) * half;
         let sin = libm::sin((half - width) * 0.5);
         let faded = if width > 0.0 { edge(half, width) / width } else { 0.0 };
         let full = 2.0 * std::f64::consts::PI;
-        Cones { half, width, inner: full * 2.0 * sin * sin, faded: full * faded }
+        SpotCone { half, width, inner: full * 2.0 * sin * sin, faded: full * faded }
     }
 }
 
-/// The cone of a spotlight.
-struct Cones {
-    /// Half its angle.
+/// The inner and outer cone of a spotlight.
+struct SpotCone {
+    /// Half the cone's angle.
     half: f64,
     /// Width of the outer part, over which it fades.
     width: f64,
-    /// Power of the inner part over the intensity on the axis, in sr.
+    /// Power of the inner cone divided by the intensity on the axis, in sr.
     inner: f64,
-    /// Power of the outer part over the intensity on the axis, in sr.
+    /// Power of the fading part divided by the intensity on the axis, in sr.
     faded: f64,
 }
 
-/// ∫ t·sin(H − t) dt from the edge of a cone inwards to δ; for small angles by the first terms of the sine, whose rest is
-/// less than 1e-9 of it.
+/// ∫ t·sin(H − t) dt from the edge of a cone inward to δ. Small angles use the first terms of the sine series; the remainder is
+/// less than 1e-9 of the result.
 fn edge(half: f64, delta: f64) -> f64 {
     if half < 0.02 {
         let (h2, d2) = (half * half, delta * delta);
@@ -103,12 +103,12 @@ fn edge(half: f64, delta: f64) -> f64 {
     delta * cos - 2.0 * sin_half * (cos * cos_half - sin * sin_half)
 }
 
-/// Distance from the edge of a cone inwards, in [0, width], at which [`edge`] has a given part of its total: Newton's method
-/// between bounds, whose last step is far smaller than the one before.
+/// Inverts [`edge`]: the distance inward from the edge of a cone, in [0, width], at which it reaches a fraction `part` of its
+/// total. Uses bracketed Newton iteration, whose last step is far smaller than the previous one.
 fn from_edge(half: f64, width: f64, part: f64) -> f64 {
     let goal = part * edge(half, width);
     let (mut low, mut high) = (0.0, width);
-    // Near the edge the sum goes by the square, or by the cube for the widest cone.
+    // Near the edge the integral grows with the square, or with the cube for the widest cone.
     let mut delta = width * part.sqrt();
     for _ in 0..60 {
         let off = edge(half, delta) - goal;
@@ -130,7 +130,7 @@ mod tests {
     use crate::lights::delta::Falloff;
     use crate::math::DVec3;
 
-    /// Relative intensity of a cone with a half angle in degrees, in a direction at an angle in degrees from its axis.
+    /// Relative intensity of a cone, at an angle in degrees from its axis.
     fn share(half_angle: f64, blend: f32, angle: f64) -> f32 {
         let position = DVec3::new(1.0, 2.0, 3.0);
         let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::None };
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_light_fades_linearly_in_the_angle() {
+    fn intensity_fades_linearly_with_angle() {
         for half_angle in [0.5, 22.5, 60.0, 90.0, 150.0] {
             for blend in [0.1_f32, 0.2, 1.0] {
                 for part in [0.0, 0.3, 0.85, 0.91, 0.97, 1.02, 1.19] {
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_blend_the_edge_is_a_step() {
+    fn zero_blend_gives_a_sharp_edge() {
         assert_eq!((share(30.0, 0.0, 29.99), share(30.0, 0.0, 30.01)), (1.0, 0.0));
         assert_eq!((share(30.0, 0.0, 0.0), share(180.0, 0.0, 179.99)), (1.0, 1.0));
     }

@@ -1,31 +1,31 @@
-//! Light from far away: a direction, or a disc in the sky.
+//! Directional lights: a single direction, or a disk in the sky.
 
 use std::f32::consts::PI;
 
 use super::InfiniteLight;
-use crate::lights::row::{LightRow, row_beyond};
-use crate::lights::sample::{End, LightSample, Source};
-use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
+use crate::lights::packet::{LightSamplePacket, infinite_packet_of};
+use crate::lights::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::F32x16;
 use crate::sampling::warp;
 
-/// Light that comes from one direction everywhere, or from a disc of directions of the same radiance.
+/// Light from one direction, or from a disk of directions with uniform radiance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionalLight {
-    /// Unit direction to the middle of the light, against the way that it travels.
+    /// Unit direction toward the light's center.
     pub to_light: Vec3,
-    /// Irradiance of a surface that faces the light.
+    /// Irradiance on a surface that faces the light.
     pub irradiance: Vec3,
-    /// 1 − cos of half the apparent diameter; 0 for a light without extent.
+    /// 1 − cos of half the angular diameter; 0 for a light without extent.
     one_minus_cos: f32,
-    /// Radiance of the disc; 0 without extent.
+    /// Radiance of the disk; 0 without extent.
     radiance: Vec3,
 }
 
 impl DirectionalLight {
-    /// A light with an apparent diameter of `angle` radians, up to π; 0 for a sharp light.
+    /// A light with an angular diameter of `angle` radians, up to π. An angle of 0 makes it sharp.
     pub fn new(to_light: Vec3, irradiance: Vec3, angle: f64) -> Self {
         let (quarter, half) = (libm::sin(angle / 4.0), libm::sin(angle / 2.0));
         let radiance = if angle > 0.0 {
@@ -36,71 +36,71 @@ impl DirectionalLight {
         Self { to_light, irradiance, one_minus_cos: (2.0 * quarter * quarter) as f32, radiance }
     }
 
-    /// Samples the light as it arrives anywhere, uniform over the solid angle of the disc.
+    /// Samples the disk uniformly over its solid angle.
     pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
         let (direction, weight) = self.arriving(u);
         (weight != Vec3::ZERO).then_some(LightSample {
-            end: End::Beyond,
+            end: ShadowRayEnd::Beyond,
             direction,
             weight,
-            source: Source::Nothing,
+            source: LightObject::Nothing,
         })
     }
 
-    /// [`DirectionalLight::sample`] side by side.
+    /// [`DirectionalLight::sample`] for a packet.
     #[inline(always)]
-    pub fn sample_row(&self, u: &[F32x16; 2]) -> LightRow {
-        row_beyond!(i => self.arriving([u[0][i], u[1][i]]))
+    pub fn sample_row(&self, u: &[F32x16; 2]) -> LightSamplePacket {
+        infinite_packet_of!(i => self.arriving([u[0][i], u[1][i]]))
     }
 
-    /// A unit direction to the light, and radiance over its pdf; for a light without extent, irradiance.
+    /// A unit direction to the light, with the radiance divided by its pdf, or the irradiance for a light without extent.
     #[inline(always)]
     pub fn arriving(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_sharp() {
             return (self.to_light, self.irradiance);
         }
         let direction = Frame::from_normal(self.to_light).to_world(warp::cone(u, self.one_minus_cos));
-        (direction, self.radiance * self.inverse_density())
+        (direction, self.radiance * self.inverse_pdf())
     }
 
     /// Radiance from a direction; 0 for a light without extent.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
-        if self.holds(direction) { self.radiance } else { Vec3::ZERO }
+        if self.contains(direction) { self.radiance } else { Vec3::ZERO }
     }
 
-    /// Pdf in sr⁻¹ of [`DirectionalLight::sample`]; 0 without extent.
+    /// Pdf of [`DirectionalLight::sample`] in sr⁻¹; 0 without extent.
     pub fn pdf(&self, direction: Vec3) -> f32 {
-        if self.holds(direction) { 1.0 / self.inverse_density() } else { 0.0 }
+        if self.contains(direction) { 1.0 / self.inverse_pdf() } else { 0.0 }
     }
 
-    /// Inverse of that pdf; 0 without extent.
+    /// Inverse of [`DirectionalLight::pdf`] inside the disk; 0 without extent.
     #[inline(always)]
-    pub fn inverse_density(&self) -> f32 {
+    pub fn inverse_pdf(&self) -> f32 {
         2.0 * PI * self.one_minus_cos
     }
 
-    /// Whether a unit direction is in the disc. Compares chords, which is exact for small discs too.
-    fn holds(&self, direction: Vec3) -> bool {
+    /// Whether a unit direction is inside the disk. Compares chords, which stays accurate for small disks.
+    fn contains(&self, direction: Vec3) -> bool {
         !self.is_sharp() && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
     }
 }
 
 impl InfiniteLight for DirectionalLight {
-    fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         self.arriving(u)
     }
 
-    fn power_over(&self, area: f64) -> Vec3 {
+    fn power_through(&self, area: f64) -> Vec3 {
         (self.arriving([0.5; 2]).1.as_dvec3() * area).as_vec3()
     }
 
     fn bounds(&self) -> LightBounds {
         LightBounds {
-            space: Space::Beyond,
+            space: DistanceFalloff::Beyond,
             center: self.to_light.as_dvec3(),
-            // Take the chord from the middle to the edge.
+            // The chord from the center to the edge.
             radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
-            power: strength(self.irradiance),
+            power: mean_channel(self.irradiance),
             cone: EmissionCone::ALL,
         }
     }
@@ -121,15 +121,15 @@ mod tests {
     use crate::sampling::{Dimension, PixelSampler};
 
     #[test]
-    fn samples_are_of_the_disc_and_bring_the_irradiance() {
+    fn disk_samples_give_the_irradiance() {
         for degrees in [1e-3_f64, 0.53, 10.0, 90.0, 180.0] {
             let sun = DirectionalLight::new(Vec3::new(0.6, 0.0, 0.8), Vec3::splat(3.0), degrees.to_radians());
             let (mut irradiance, count) = (0.0, 4096);
             for sample in 0..count {
                 let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(0)).to_array();
                 let sample = sun.sample(u).expect("light");
-                assert_eq!(sample.end, End::Beyond);
-                // The very edge may count either way.
+                assert_eq!(sample.end, ShadowRayEnd::Beyond);
+                // At the very edge, rounding decides.
                 if sun.pdf(sample.direction) > 0.0 {
                     let product =
                         sun.radiance(sample.direction).x / sun.pdf(sample.direction) / sample.weight.x;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sharp_light_is_seen_by_no_ray() {
+    fn sharp_lights_are_invisible_to_rays() {
         let sun = DirectionalLight::new(Vec3::Y, Vec3::ONE, 0.0);
         assert_eq!((sun.radiance(Vec3::Y), sun.pdf(Vec3::Y)), (Vec3::ZERO, 0.0));
         assert_eq!(sun.sample([0.3, 0.4]).map(|sample| sample.weight), Some(Vec3::ONE));

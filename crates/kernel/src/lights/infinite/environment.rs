@@ -1,115 +1,120 @@
-//! Environment light.
+//! Environment lights.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
 
 use super::InfiniteLight;
-use super::sky::SkyMap;
-use crate::lights::row::LightRow;
-use crate::lights::sample::{End, LightSample, Source};
-use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
+use super::environment_map::EnvironmentMap;
+use crate::lights::packet::LightSamplePacket;
+use crate::lights::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::lights::tree::bounds::{DistanceFalloff, EmissionCone, LightBounds, mean_channel};
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
-/// Light that every ray sees which leaves the scene.
+/// Light from every direction, visible to rays that leave the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Environment {
     /// The same radiance everywhere.
     Constant(Vec3),
-    /// A map of radiance.
+    /// A radiance map.
     Map {
         /// The map.
-        sky: Arc<SkyMap>,
-        /// Radiance of white.
+        sky: Arc<EnvironmentMap>,
+        /// Radiance of a white texel.
         factor: Vec3,
-        /// Turns about +y, counterclockwise seen from above, in [0, 1).
+        /// Rotation about +y as a fraction of 360°, counterclockwise seen from above, in [0, 1).
         turn: f32,
     },
 }
 
-/// Pdf of samples of a constant radiance: uniform over the hemisphere before the surface.
-const HEMISPHERE: f32 = 1.0 / (2.0 * PI);
+/// Sampling pdf of a constant environment: uniform over the hemisphere above the surface.
+const HEMISPHERE_PDF: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
-    /// A map whose white is times a factor, turned by an angle in degrees.
-    pub fn map(sky: Arc<SkyMap>, factor: Vec3, degrees: f64) -> Self {
+    /// A map scaled by `factor` and rotated by an angle in degrees.
+    pub fn map(sky: Arc<EnvironmentMap>, factor: Vec3, degrees: f64) -> Self {
         Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
     }
 
-    /// Radiance from a unit direction, and the pdf in sr⁻¹ of [`Environment::sample`], on the side of the surface that the
-    /// normal is on.
+    /// Radiance from a unit direction, and the pdf of [`Environment::sample`] in sr⁻¹, for directions above the surface.
     #[inline(always)]
     pub fn arriving(&self, direction: Vec3) -> (Vec3, f32) {
         match self {
-            Self::Constant(radiance) => (*radiance, HEMISPHERE),
+            Self::Constant(radiance) => (*radiance, HEMISPHERE_PDF),
             Self::Map { sky, factor, turn } => {
-                let (color, density) = sky.lookup(direction, *turn);
-                (color * *factor, density)
+                let (color, pdf) = sky.lookup(direction, *turn);
+                (color * *factor, pdf)
             }
         }
     }
 
-    /// [`Environment::arriving`] for directions side by side.
+    /// [`Environment::arriving`] for a packet of directions.
     #[inline(always)]
     pub fn arriving_row(&self, directions: &Vec3x16) -> (Vec3x16, F32x16) {
         match self {
             Self::Constant(Vec3 { x, y, z }) => {
-                ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE; PACKET_SIZE])
+                ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE_PDF; PACKET_SIZE])
             }
             Self::Map { sky, factor, turn } => {
-                let (mut colors, densities) = sky.lookup_row(directions, *turn);
+                let (mut colors, pdfs) = sky.lookup_row(directions, *turn);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
                 }
-                (colors, densities)
+                (colors, pdfs)
             }
         }
     }
 
-    /// Samples of the environment for surfaces of these normals, side by side.
+    /// Samples the environment for a packet of surface normals.
     #[inline(always)]
-    pub fn sample_row(&self, normals: &Vec3x16, u: &[F32x16; 2]) -> LightRow {
-        let (directions, mut weights, densities) = match self {
+    pub fn sample_row(&self, normals: &Vec3x16, u: &[F32x16; 2]) -> LightSamplePacket {
+        let (directions, mut weights, pdfs) = match self {
             Self::Constant(_) => {
                 let mut directions = [[0.0; PACKET_SIZE]; 3];
                 for i in 0..PACKET_SIZE {
                     let frame = Frame::from_normal(lane(normals, i));
                     set_lane(&mut directions, i, frame.to_world(warp::cone([u[0][i], u[1][i]], 1.0)));
                 }
-                let (radiance, densities) = self.arriving_row(&directions);
-                (directions, radiance, densities)
+                let (radiance, pdfs) = self.arriving_row(&directions);
+                (directions, radiance, pdfs)
             }
             Self::Map { sky, factor, turn } => {
-                let (directions, mut colors, densities) = sky.sample_row(u, *turn);
+                let (directions, mut colors, pdfs) = sky.sample_row(u, *turn);
                 for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
                 }
-                (directions, colors, densities)
+                (directions, colors, pdfs)
             }
         };
-        let mut inverse_densities = [0.0; PACKET_SIZE];
+        let mut inverse_pdfs = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
-            inverse_densities[i] = if densities[i] > 0.0 { 1.0 / densities[i] } else { 0.0 };
-            let weight = lane(&weights, i) * inverse_densities[i];
+            // The pdf is 0 in corners of cells where only the neighboring texels are bright.
+            inverse_pdfs[i] = if pdfs[i] > 0.0 { 1.0 / pdfs[i] } else { 0.0 };
+            let weight = lane(&weights, i) * inverse_pdfs[i];
             set_lane(&mut weights, i, weight);
         }
-        let dark = LightRow::dark(Source::Nothing);
-        LightRow { directions, weights, beyond: u32::MAX, of_sky: inverse_densities, ..dark }
+        let dark = LightSamplePacket::dark(LightObject::Nothing);
+        LightSamplePacket {
+            directions,
+            weights,
+            beyond: u32::MAX,
+            environment_inverse_pdfs: inverse_pdfs,
+            ..dark
+        }
     }
 
-    /// Inverse pdf of its samples at a direction, in sr.
+    /// Inverse sampling pdf of a direction, in sr.
     #[inline(always)]
-    pub fn inverse_density(&self, direction: Vec3) -> f32 {
-        let (_, density) = self.arriving(direction);
-        if density > 0.0 { 1.0 / density } else { 0.0 }
+    pub fn inverse_pdf(&self, direction: Vec3) -> f32 {
+        let (_, pdf) = self.arriving(direction);
+        if pdf > 0.0 { 1.0 / pdf } else { 0.0 }
     }
 
-    /// The mean of the radiance over all directions.
+    /// Mean radiance over all directions.
     pub fn mean(&self) -> Vec3 {
         match self {
             Self::Constant(radiance) => *radiance,
@@ -117,47 +122,58 @@ impl Environment {
         }
     }
 
-    /// Samples the environment for a surface of this normal.
+    /// Samples the environment for a surface with this normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let (direction, radiance, density) = match self {
+        let (direction, radiance, pdf) = match self {
             Self::Constant(radiance) => {
-                (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE)
+                (Frame::from_normal(normal).to_world(warp::cone(u, 1.0)), *radiance, HEMISPHERE_PDF)
             }
             Self::Map { sky, factor, turn } => {
-                let (direction, color, density) = sky.sample(u, *turn);
-                (direction, color * *factor, density)
+                let (direction, color, pdf) = sky.sample(u, *turn);
+                (direction, color * *factor, pdf)
             }
         };
-        let weight = radiance * if density > 0.0 { 1.0 / density } else { 0.0 };
+        let weight = radiance * if pdf > 0.0 { 1.0 / pdf } else { 0.0 };
         let is_light = weight != Vec3::ZERO;
-        is_light.then_some(LightSample { end: End::Beyond, direction, weight, source: Source::Nothing })
+        is_light.then_some(LightSample {
+            end: ShadowRayEnd::Beyond,
+            direction,
+            weight,
+            source: LightObject::Nothing,
+        })
     }
 }
 
 impl InfiniteLight for Environment {
-    fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+    fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, turn } => {
-                let (direction, color, density) = sky.sample(u, *turn);
-                // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
-                (direction, color * *factor * if density > 0.0 { 1.0 / density } else { 0.0 })
+                let (direction, color, pdf) = sky.sample(u, *turn);
+                // The pdf is 0 in corners of cells where only the neighboring texels are bright.
+                (direction, color * *factor * if pdf > 0.0 { 1.0 / pdf } else { 0.0 })
             }
         }
     }
 
-    fn power_over(&self, area: f64) -> Vec3 {
+    fn power_through(&self, area: f64) -> Vec3 {
         (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
     }
 
-    /// All directions, and the irradiance of a surface by the mean radiance.
+    /// All directions, with the irradiance of a surface under the mean radiance.
     fn bounds(&self) -> LightBounds {
         let mean = match self {
-            Self::Constant(radiance) => strength(*radiance),
-            Self::Map { sky, factor, .. } => sky.mean_luminance() * strength(*factor),
+            Self::Constant(radiance) => mean_channel(*radiance),
+            Self::Map { sky, factor, .. } => sky.mean_luminance() * mean_channel(*factor),
         };
         let power = std::f64::consts::PI * mean;
-        LightBounds { space: Space::Beyond, center: DVec3::ZERO, radius: 1.0, power, cone: EmissionCone::ALL }
+        LightBounds {
+            space: DistanceFalloff::Beyond,
+            center: DVec3::ZERO,
+            radius: 1.0,
+            power,
+            cone: EmissionCone::ALL,
+        }
     }
 
     fn middle(&self) -> Option<Vec3> {

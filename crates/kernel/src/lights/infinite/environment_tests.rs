@@ -5,7 +5,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::math::DVec3;
 use crate::sampling::{Dimension, PixelSampler};
 
-/// A map by a function of column and row.
+/// A map whose texels are a function of column and row.
 fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
     let places = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
     let data = TexelData::Float(places.map(|(column, row)| color(column, row)).collect());
@@ -13,10 +13,10 @@ fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels>
 }
 
 fn light(texels: &Arc<Texels>, degrees: f64) -> Environment {
-    Environment::map(Arc::new(SkyMap::new(Arc::clone(texels)).expect("light")), Vec3::ONE, degrees)
+    Environment::map(Arc::new(EnvironmentMap::new(Arc::clone(texels)).expect("light")), Vec3::ONE, degrees)
 }
 
-/// An irregular map with black parts and a bright spot.
+/// An irregular map with black areas and some bright spots.
 fn patchy(width: u32, height: u32) -> Arc<Texels> {
     map(width, height, |x, y| {
         let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
@@ -32,9 +32,9 @@ fn random(i: u32) -> [f32; 2] {
     PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Dimension::Light(0)).to_array()
 }
 
-/// The contract in double precision: a direction's colour.
+/// Reference implementation in double precision: the color of a direction.
 fn reference(texels: &Texels, direction: DVec3, degrees: f64) -> DVec3 {
-    // Turned back by the angle about +y.
+    // Undo the rotation about +y.
     let (sin, cos) = (-degrees).to_radians().sin_cos();
     let d =
         DVec3::new(direction.x * cos + direction.z * sin, direction.y, direction.z * cos - direction.x * sin);
@@ -57,19 +57,20 @@ fn directions(count: u32) -> impl Iterator<Item = Vec3> {
 }
 
 #[test]
-fn directions_see_what_the_contract_says() {
+fn lookups_match_the_reference() {
     for (width, height) in [(1, 1), (2, 1), (1, 3), (7, 5), (64, 32)] {
         let texels =
             map(width, height, |x, y| Vec3::new((x % 5) as f32, (y % 3) as f32, ((x + y) % 2) as f32));
         for degrees in [0.0, 90.0, -30.0, 400.0] {
             let environment = Environment::Map {
                 sky: Arc::new(
-                    SkyMap::new(map(width, height, |x, y| texels.get(x, y) + Vec3::ONE)).expect("light"),
+                    EnvironmentMap::new(map(width, height, |x, y| texels.get(x, y) + Vec3::ONE))
+                        .expect("light"),
                 ),
                 factor: Vec3::new(1.0, 2.0, 3.0),
                 turn: (degrees / 360.0_f64).rem_euclid(1.0) as f32,
             };
-            // At the poles every azimuth is right.
+            // At the poles, every azimuth is valid.
             for direction in directions(4000).filter(|direction| direction.y.abs() < 1.0) {
                 let expected =
                     (reference(&texels, direction.as_dvec3(), degrees) + 1.0) * DVec3::new(1.0, 2.0, 3.0);
@@ -84,15 +85,15 @@ fn directions_see_what_the_contract_says() {
 }
 
 #[test]
-fn samples_have_the_density_that_their_directions_have() {
+fn sample_pdfs_equal_direction_pdfs() {
     for texels in [patchy(64, 32), patchy(1, 1), patchy(5, 3), patchy(1000, 500)] {
-        let Some(sky) = SkyMap::new(texels) else { continue };
+        let Some(sky) = EnvironmentMap::new(texels) else { continue };
         let environment = Environment::map(Arc::new(sky), Vec3::new(1.0, 0.5, 2.0), 77.0);
         let (mut found, mut off) = (0, 0);
         for i in 0..20_000 {
             let Some(sample) = environment.sample(Vec3::Y, random(i)) else { continue };
             let (radiance, density) = environment.arriving(sample.direction);
-            // The direction is rounded: next to a dark corner of a cell, or in the next cell, its numbers differ.
+            // Rounding of the direction changes the result next to a dark corner of a cell, or across a cell border.
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
             assert!((sample.direction.length() - 1.0).abs() < 1e-6);
@@ -105,10 +106,10 @@ fn samples_have_the_density_that_their_directions_have() {
     }
 }
 
-/// The light of a grey map arrives by samples of equal weight, 4π times the mean; but rows of cells at the poles are interpolated
-/// by angles and sampled by heights.
+/// For a gray map, all samples should have the same weight: 4π times the mean. Rows near the poles deviate because they are
+/// interpolated by angle but sampled by height.
 #[test]
-fn samples_are_as_dense_as_the_light_between_texels() {
+fn sampling_density_follows_interpolated_light() {
     let (width, height) = (64, 32);
     let texels = map(width, height, |x, y| Vec3::splat(1.0 + ((x * 7 + y * 13) % 10) as f32));
     let environment = light(&texels, 10.0);
@@ -127,10 +128,10 @@ fn samples_are_as_dense_as_the_light_between_texels() {
 }
 
 #[test]
-fn where_there_is_light_there_are_samples_and_densities_make_a_whole() {
+fn pdfs_integrate_to_one_and_cover_all_light() {
     for texels in [patchy(64, 32), map(32, 16, |x, y| Vec3::splat(f32::from(u8::from(x == 9 && y == 0))))] {
         let environment = light(&texels, 30.0);
-        // No direction is on the border of two columns, where rounding decides.
+        // The grid avoids column borders, where rounding decides.
         let (columns, rows) = (256, 4096);
         let mut whole = 0.0;
         for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))) {
@@ -145,9 +146,9 @@ fn where_there_is_light_there_are_samples_and_densities_make_a_whole() {
     }
 }
 
-/// χ² of samples over cells of (turn, height), against the pdfs; cells of less than 5 expected samples are merged.
+/// χ² test of samples against the pdfs over cells of (rotation, height); cells with fewer than 5 expected samples are merged.
 #[test]
-fn samples_come_as_often_as_their_densities_say() {
+fn sample_frequencies_match_the_pdf() {
     let (width, height) = (24_usize, 12_usize);
     for degrees in [0.0, 135.0] {
         let environment = light(&patchy(width as u32, height as u32), degrees);
@@ -155,7 +156,7 @@ fn samples_come_as_often_as_their_densities_say() {
         let count = 1_000_000;
         let mut counts = vec![0.0; columns * rows];
         for i in 0..count {
-            // Independent numbers: those of one pixel are too even.
+            // Use independent numbers: one pixel's are stratified.
             let number = |salt: u32| {
                 let bits = (i * 2 + salt).wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
                 let bits = (bits ^ bits >> 15).wrapping_mul(0x2c1b_3c6d);
@@ -190,7 +191,7 @@ fn samples_come_as_often_as_their_densities_say() {
                 pooled = (0.0, 0.0);
             }
         }
-        // Wilson and Hilferty's normal for χ²; the midpoint sums above are off by a little at borders of cells.
+        // Wilson–Hilferty approximation of χ². The midpoint sums above are slightly off at cell borders.
         let normal =
             ((statistic / freedom).cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt();
         assert!(freedom > 500.0 && normal.abs() < 5.0, "{degrees}: {normal} by {freedom}");
@@ -198,12 +199,12 @@ fn samples_come_as_often_as_their_densities_say() {
 }
 
 #[test]
-fn black_maps_give_no_light() {
-    assert_eq!(SkyMap::new(map(8, 4, |_, _| Vec3::ZERO)), None);
+fn black_maps_are_rejected() {
+    assert_eq!(EnvironmentMap::new(map(8, 4, |_, _| Vec3::ZERO)), None);
 }
 
 #[test]
-fn a_constant_radiance_is_sampled_where_the_surface_sees_it() {
+fn constant_light_is_sampled_above_the_surface() {
     let environment = Environment::Constant(Vec3::new(1.0, 2.0, 3.0));
     let normal = Vec3::new(0.6, -0.8, 0.0);
     let mut irradiance = Vec3::ZERO;
@@ -219,7 +220,7 @@ fn a_constant_radiance_is_sampled_where_the_surface_sees_it() {
 }
 
 #[test]
-fn maps_of_any_size_are_made_and_sampled() {
+fn maps_of_any_size_can_be_sampled() {
     for (width, height) in [(1, 1), (65_536, 1), (1, 4096), (4096, 2048)] {
         let texels = map(width, height, |x, y| Vec3::splat(if (x + y) % 1000 == 0 { 1e6 } else { 1e-3 }));
         let environment = light(&texels, 0.0);

@@ -1,33 +1,33 @@
-//! Lights from beyond the scene: every ray that leaves may see them, and none hits them.
+//! Lights at infinity: rays that leave the scene may see them.
 
 mod directional;
 mod environment;
-mod sky;
+mod environment_map;
 
 pub use directional::DirectionalLight;
 pub use environment::Environment;
-pub use sky::SkyMap;
+pub use environment_map::EnvironmentMap;
 
 use super::tree::LightBounds;
 use crate::math::Vec3;
 
-/// A light from beyond the scene. How a surface samples it, and what a ray sees of it, its own file tells:
-/// [`DirectionalLight`] is alike everywhere, an [`Environment`] follows the surface's normal.
+/// A light at infinity. Sampling for a surface and the radiance along a ray are methods of each type: a [`DirectionalLight`] is
+/// the same everywhere, whereas sampling an [`Environment`] depends on the surface normal.
 pub trait InfiniteLight {
-    /// Samples a unit direction to its light by numbers in [0, 1), of all that arrive anywhere; with the radiance over the pdf, or
-    /// the irradiance of a light without extent.
-    fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3);
+    /// Samples a unit direction to the light with `u` in [0, 1)², independently of a surface. Returns it with the radiance
+    /// divided by the pdf, or with the irradiance for a light without extent.
+    fn sample_direction(&self, u: [f32; 2]) -> (Vec3, Vec3);
 
-    /// Power in W through discs of this area, one across each direction: the mean of [`InfiniteLight::arriving_anywhere`] times
-    /// the area.
-    fn power_over(&self, area: f64) -> Vec3;
+    /// Power in W through a disk of this area perpendicular to each direction: the mean weight of
+    /// [`InfiniteLight::sample_direction`] times the area.
+    fn power_through(&self, area: f64) -> Vec3;
 
-    /// Bounds of its directions and its irradiance.
+    /// Bounds of its directions and irradiance.
     fn bounds(&self) -> LightBounds;
 
-    /// Unit direction to its middle. `None` if it comes from all around.
+    /// Unit direction to its center. `None` if it surrounds the scene.
     fn middle(&self) -> Option<Vec3>;
 
-    /// Whether it has no extent.
+    /// Whether the light has no angular extent.
     fn is_sharp(&self) -> bool;
 }

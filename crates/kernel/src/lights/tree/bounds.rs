@@ -1,82 +1,83 @@
-//! Bounds of lights: positions, power, and directions of emission.
+//! Bounds of lights: position, power and emission directions.
 
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// Bounds of one light or of several, for estimates without examining each (Conty Estevez and Kulla, *Importance Sampling of
-/// Many Lights with Adaptive Tree Splitting*, 2018, section 4).
+/// Bounds of one or more lights, used to estimate their contribution without examining each one (Conty Estevez and Kulla,
+/// *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018, section 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBounds {
-    /// Effect of distance on the light.
-    pub space: Space,
-    /// Centre of a sphere around them.
+    /// How distance affects the light.
+    pub space: DistanceFalloff,
+    /// Center of a bounding sphere.
     pub center: DVec3,
-    /// Radius of that sphere.
+    /// Radius of the bounding sphere.
     pub radius: f64,
-    /// Expected emission along their axes, > 0: W·sr⁻¹, or irradiance for lights without fall-off; mean of the colours.
+    /// Expected emission along the axes, > 0, averaged over the color channels: in W·sr⁻¹, or the irradiance for lights without
+    /// falloff.
     pub power: f64,
-    /// Directions of the emission.
+    /// Directions of emission.
     pub cone: EmissionCone,
 }
 
-/// Meaning of distances to lights.
+/// How distance affects a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Space {
-    /// Lights whose irradiance falls with the square of the distance.
-    Weakening,
-    /// Lights with a position, but without fall-off.
-    Steady,
-    /// Light from beyond the scene: the sphere is around unit vectors to it.
+pub enum DistanceFalloff {
+    /// Irradiance falls with the square of the distance.
+    InverseSquare,
+    /// The light has a position, but no falloff.
+    Constant,
+    /// At infinity: the sphere bounds unit vectors toward the light.
     Beyond,
 }
 
-/// Directions into which light is emitted.
+/// A bound on the directions into which lights emit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionCone {
-    /// Unit axis of a cone around the axes of all lights.
+    /// Axis of a cone that contains the emission axes of all lights.
     pub axis: DVec3,
     /// Cosine of its half angle.
     pub cos: f64,
-    /// Fall-off beyond the cone.
-    pub edge: Edge,
+    /// Falloff outside the cone.
+    pub edge: ConeEdge,
 }
 
-/// Fall-off of the emission beyond a cone.
+/// Falloff of the emission outside a cone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Edge {
-    /// No emission beyond the cone.
+pub enum ConeEdge {
+    /// No emission outside the cone.
     Sharp,
-    /// The cosine of the angle from the cone, 0 from 90° on.
+    /// Cosine of the angle to the cone; 0 from 90° on.
     Cosine,
 }
 
 impl EmissionCone {
     /// All directions.
-    pub const ALL: Self = Self { axis: DVec3::Z, cos: -1.0, edge: Edge::Sharp };
+    pub const ALL: Self = Self { axis: DVec3::Z, cos: -1.0, edge: ConeEdge::Sharp };
 
     /// Emission from the front of a flat surface.
     pub fn of_front(normal: DVec3) -> Self {
-        Self { axis: normal, cos: 1.0, edge: Edge::Cosine }
+        Self { axis: normal, cos: 1.0, edge: ConeEdge::Cosine }
     }
 
-    /// Emission into a cone of a half angle up to π.
+    /// Emission into a cone with a half angle of up to π.
     pub fn within(axis: DVec3, half_angle: f64) -> Self {
-        Self { axis, cos: libm::cos(half_angle), edge: Edge::Sharp }
+        Self { axis, cos: libm::cos(half_angle), edge: ConeEdge::Sharp }
     }
 
-    /// A cone around all of these, about the mean of their axes.
+    /// A cone that contains all the given ones, around the mean of their axes.
     fn around<'a>(cones: impl Iterator<Item = &'a Self> + Clone) -> Self {
-        let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(Edge::Sharp);
+        let edge = cones.clone().map(|cone| cone.edge).max().unwrap_or(ConeEdge::Sharp);
         let sum: DVec3 = cones.clone().map(|cone| cone.axis).sum();
         let Some(axis) = sum.try_normalize() else { return Self { edge, ..Self::ALL } };
         Self { axis, cos: cones.map(|cone| cone.widest_from(axis)).fold(1.0, f64::min), edge }
     }
 
-    /// Cosine of the greatest angle from an axis to a direction of the cone.
+    /// Cosine of the largest angle between `axis` and a direction in the cone.
     fn widest_from(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
         let (sin, own_sin) = (sine(cos), sine(self.cos));
-        // Together they exceed 180°.
+        // The angles add up to more than 180°.
         if cos <= -self.cos { -1.0 } else { cos * self.cos - sin * own_sin }
     }
 }
@@ -86,19 +87,19 @@ fn sine(cos: f64) -> f64 {
 }
 
 impl LightBounds {
-    /// Scaled by a colour.
+    /// The bounds, scaled by a color.
     pub fn times(self, color: Vec3) -> Self {
-        Self { power: self.power * strength(color), ..self }
+        Self { power: self.power * mean_channel(color), ..self }
     }
 
-    /// Bounds of a light in a box, with fall-off.
+    /// Bounds of a light in a box, with inverse-square falloff.
     pub fn in_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let radius = (max - min).length() * 0.5;
-        Self { space: Space::Weakening, center: (min + max) * 0.5, radius, power, cone }
+        Self { space: DistanceFalloff::InverseSquare, center: (min + max) * 0.5, radius, power, cone }
     }
 
-    /// Bounds of a triangle with its front along (b − a) × (c − a), for a unit of radiance. `None` if it has no area.
+    /// Bounds of a triangle of unit radiance whose front faces along (b − a) × (c − a). `None` if it has no area.
     pub fn of_triangle(corners: &[DVec3; 3]) -> Option<Self> {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
@@ -106,7 +107,7 @@ impl LightBounds {
         Some(Self::in_box(Aabb::around_f64(*corners), vector_area.length(), EmissionCone::of_front(normal)))
     }
 
-    /// Bounds around all of these, which are in one space. `None` if there are none.
+    /// Bounds that contain all the given ones, which must have the same space. `None` if there are none.
     pub fn around<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -125,20 +126,20 @@ impl LightBounds {
     }
 }
 
-/// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine emitters give all of
-/// their power if the axes agree, a quarter of it if the axes are uniform.
+/// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine emitters contribute all
+/// their power if their axes agree, and a quarter of it if the axes are uniformly distributed.
 fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {
         match cone.edge {
-            Edge::Sharp => everywhere += power,
-            Edge::Cosine => (by_cosine, axes) = (by_cosine + power, axes + cone.axis * *power),
+            ConeEdge::Sharp => everywhere += power,
+            ConeEdge::Cosine => (by_cosine, axes) = (by_cosine + power, axes + cone.axis * *power),
         }
     }
     everywhere + 0.25 * (by_cosine + 3.0 * axes.length().min(by_cosine))
 }
 
-/// One number for a colour, as lights are chosen by their effect on all of its components.
-pub fn strength(color: Vec3) -> f64 {
+/// Reduces a color to one number. All channels count equally, since lights are chosen by their effect on each of them.
+pub fn mean_channel(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }

@@ -1,37 +1,37 @@
-//! Cuts through a light tree: sets of nodes from whose children a point picks. If the lights are not too many, these are all
-//! nodes over lights. Otherwise nodes so near to the point that their bounds say little are replaced by their children, as far
-//! as there is room. Many picks for one point share a cut.
+//! Cuts through a light tree: sets of nodes from whose children a point picks. If the lights are few enough, the cut has all
+//! nodes over lights. Otherwise, nodes so close to the point that their bounds are loose are replaced by their children, while
+//! there is room. All picks for one point share a cut.
 
 use arrayvec::ArrayVec;
 
-use super::node::{Child, Expected, Receiver};
-use super::{LightTree, NOWHERE, Pick, ROOT, Shares, Way, below, target};
+use super::node::{ExpectedContributions, NodeChild, Receiver};
+use super::{CumulativeImportance, LightPick, LightTree, NOT_IN_TREE, PathCache, ROOT, below, target};
 use crate::math::Vec3;
 use crate::math::lanes::F32x16;
 
-/// A cut, for picks at one point after the other.
-pub struct Cut<'a> {
+/// A cut, for picks at successive points.
+pub struct LightTreeCut<'a> {
     tree: &'a LightTree,
-    /// Most nodes.
+    /// Maximum number of nodes.
     room: usize,
     receiver: Receiver,
-    /// Numbers of the nodes.
-    nodes: ArrayVec<u32, { Cut::MOST }>,
-    /// Importance of their children; 0 for those that are nodes of the cut themselves.
-    importance: ArrayVec<F32x16, { Cut::MOST }>,
-    /// Cumulative importance up to each node.
-    sums: ArrayVec<f64, { Cut::MOST }>,
+    /// Indices of the nodes.
+    nodes: ArrayVec<u32, { LightTreeCut::MOST }>,
+    /// Importance of their children; 0 for children that are in the cut themselves.
+    importance: ArrayVec<F32x16, { LightTreeCut::MOST }>,
+    /// Cumulative importance up to and including each node.
+    sums: ArrayVec<f64, { LightTreeCut::MOST }>,
 }
 
-/// Least nearness at which a node is replaced: the square of the sine of half the angle that its bounding sphere
+/// Minimum nearness at which a node is replaced by its children: the squared sine of half the angle that its bounding sphere
 /// subtends.
 const NEAR: f32 = 0.05;
 
-impl<'a> Cut<'a> {
-    /// Most nodes of any cut.
+impl<'a> LightTreeCut<'a> {
+    /// Maximum number of nodes in any cut.
     pub const MOST: usize = 64;
 
-    /// A cut through a tree, of so many nodes at most; for no point yet.
+    /// A cut with at most `room` nodes; [`LightTreeCut::move_to`] must be called before picking.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::plain(Vec3::ZERO, Vec3::ZERO);
@@ -46,9 +46,9 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// Moves the cut to a point of a surface.
+    /// Moves the cut to a surface point.
     #[inline(always)]
-    pub fn go_to(&mut self, receiver: &Receiver) {
+    pub fn move_to(&mut self, receiver: &Receiver) {
         let tree = self.tree;
         self.receiver = *receiver;
         self.nodes.clear();
@@ -64,9 +64,9 @@ impl<'a> Cut<'a> {
         }
         while self.importance.len() < self.nodes.len() {
             let node = &tree.nodes[self.nodes[self.importance.len()] as usize];
-            let Expected { mut importance, nearness } = node.expected(receiver);
+            let ExpectedContributions { mut importance, nearness } = node.expected(receiver);
             for i in 0..node.count as usize {
-                if let Child::Node(below) = node.children[i]
+                if let NodeChild::LightTreeNode(below) = node.children[i]
                     && importance[i] > 0.0
                     && nearness[i] > NEAR
                     && self.nodes.len() < self.room
@@ -84,14 +84,14 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// Importance of all nodes.
+    /// Total importance.
     #[inline(always)]
     fn total(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// [`LightTree::pick`] by the cut, for numbers that increase. `picked` gets the index of each number, the light and its
-    /// probability, but no rest.
+    /// Picks lights like [`LightTree::pick`], for increasing numbers `u`. `picked` receives the index of each number, the light
+    /// and its probability.
     #[inline(always)]
     pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
         let all = self.total();
@@ -99,9 +99,10 @@ impl<'a> Cut<'a> {
             return;
         }
         let inverse = 1.0 / all;
-        let (mut index, mut way) = (0, Way::NEW);
-        let (mut of, mut shares) = (usize::MAX, Shares::NONE);
-        // Keep the sum before the node, and its own sum over the sum over its children, which is not rounded.
+        let (mut index, mut way) = (0, PathCache::NEW);
+        let (mut of, mut shares) = (usize::MAX, CumulativeImportance::NONE);
+        // `before` is the sum before the node. `scale` corrects for rounding: the exact sum over the children divided by the
+        // node's share of the rounded total.
         let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
             let target = target(u, all);
@@ -109,18 +110,18 @@ impl<'a> Cut<'a> {
                 index += 1;
             }
             if of != index {
-                (of, shares) = (index, Shares::new(&self.importance[index]));
+                (of, shares) = (index, CumulativeImportance::new(&self.importance[index]));
                 before = if index == 0 { 0.0 } else { self.sums[index - 1] };
                 scale = shares.total() / (self.sums[index] - before);
             }
-            // Stay below the sum over the children, which is above 0 as the node's sum is.
+            // Stay below the sum over the children, which is positive because the node's sum is.
             let part = below((target - before) * scale, shares.total());
             let child = shares.find(part);
             let probability = self.share(index, child, inverse);
             match self.tree.nodes[self.nodes[index] as usize].children[child] {
-                Child::Light(light) => picked(place, light, probability),
-                Child::Node(node) => {
-                    let so_far = Pick { light: 0, probability, rest: shares.rest(part, child) };
+                NodeChild::Light(light) => picked(place, light, probability),
+                NodeChild::LightTreeNode(node) => {
+                    let so_far = LightPick { light: 0, probability, rest: shares.rest(part, child) };
                     if let Some(pick) = self.tree.pick_under(node, &self.receiver, so_far, &mut way) {
                         picked(place, pick.light, pick.probability);
                     }
@@ -129,44 +130,44 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// The probability of a child of a node, given the inverse importance of all.
+    /// Probability of a node's child, given the inverse of the total importance.
     #[inline(always)]
     fn share(&self, index: usize, child: usize, inverse: f64) -> f32 {
         (f64::from(self.importance[index][child]) * inverse) as f32
     }
 
-    /// The probability with which [`Cut::pick`] picks a light.
+    /// The probability that [`LightTreeCut::pick`] picks a light.
     #[inline]
     pub fn probability(&self, light: u32) -> f32 {
-        let place = self.tree.places[light as usize];
-        if place == NOWHERE || !(self.total() > 0.0) {
+        let place = self.tree.positions[light as usize];
+        if place == NOT_IN_TREE || !(self.total() > 0.0) {
             return 0.0;
         }
         // Find the last node of the cut on the path to the light.
         let (mut node, mut last) = (ROOT, None);
         loop {
             let one = &self.tree.nodes[node as usize];
-            let child = one.child_over(place);
+            let child = one.child_above(place);
             if let Some(index) = self.nodes.iter().position(|&other| other == node) {
                 last = Some((index, child));
             }
             match one.children[child] {
-                Child::Light(_) => break,
-                Child::Node(below) => node = below,
+                NodeChild::Light(_) => break,
+                NodeChild::LightTreeNode(below) => node = below,
             }
         }
         let Some((index, child)) = last else { return 0.0 };
         let share = self.share(index, child, 1.0 / self.total());
         match self.tree.nodes[self.nodes[index] as usize].children[child] {
-            Child::Node(below) if share > 0.0 => {
+            NodeChild::LightTreeNode(below) if share > 0.0 => {
                 self.tree.probability_under(below, &self.receiver, place, share)
             }
-            Child::Node(_) | Child::Light(_) => share,
+            NodeChild::LightTreeNode(_) | NodeChild::Light(_) => share,
         }
     }
 }
 
-/// The sum of a row, in one order on all machines.
+/// Sums a packet in a fixed order, the same on all machines.
 #[inline(always)]
 fn total(importance: &F32x16) -> f64 {
     let mut row = *importance;

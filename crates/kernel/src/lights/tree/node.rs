@@ -1,50 +1,50 @@
-//! Nodes of a light tree: the bounds of sixteen children side by side.
+//! Nodes of a light tree, with the bounds of 16 children in SIMD form.
 
-use super::bounds::{Edge, LightBounds, Space};
+use super::bounds::{ConeEdge, DistanceFalloff, LightBounds};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
-/// A node of a tree, with its children.
+/// A node with up to 16 children.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Node {
+pub struct LightTreeNode {
     /// Bounds of the children's positions and emission.
-    bounds: BoundsRow,
-    /// Whether all children are in the scene, fall off with distance and emit in all directions, as points and balls do. Otherwise
-    /// the computations take account of all of this.
+    bounds: LightBoundsPacket,
+    /// Whether all children have a position, inverse-square falloff, and emission in all directions, like point lights and
+    /// spheres. Otherwise, the general code path is used.
     is_plain: bool,
-    /// Contents of the children.
-    pub children: [Child; PACKET_SIZE],
-    /// The number of leaves before each child, in the order of the tree; that of the whole tree for an unused child.
+    /// The children.
+    pub children: [NodeChild; PACKET_SIZE],
+    /// Number of leaves before each child, in tree order; for unused children, the number of leaves in the tree.
     pub first: [u32; PACKET_SIZE],
     /// Number of children.
     pub count: u32,
 }
 
-/// Bounds of lights, side by side.
+/// A packet of light bounds.
 #[derive(Clone, Debug, PartialEq)]
-struct BoundsRow {
-    /// Centres of the bounding spheres.
+struct LightBoundsPacket {
+    /// Centers of the bounding spheres.
     center: Vec3x16,
-    /// Radii of the spheres, with the rounding errors of the centres.
+    /// Radii of the bounding spheres, including rounding errors of the centers.
     radius: F32x16,
-    /// 1 if the sphere is in the scene, 0 if it is among directions.
+    /// 1 if the sphere bounds positions, 0 if it bounds directions.
     is_place: F32x16,
-    /// 1 if light falls off with distance, else 0.
+    /// 1 with inverse-square falloff, otherwise 0.
     weakens: F32x16,
-    /// Power in a unit of about the tree's power; 0 in an unused lane.
+    /// Power, in units of about the whole tree's power; 0 in unused lanes.
     power: F32x16,
-    /// Inverse of four times the radii.
+    /// 1 / (4 · radius).
     spread: F32x16,
-    /// Axes of the cones of emission.
+    /// Axes of the emission cones.
     axis: Vec3x16,
-    /// Cosines of their half angles.
+    /// Cosines of the cones' half angles.
     cos: F32x16,
     sin: F32x16,
     /// Cosine of the angle from the cone at which emission ends.
     end: F32x16,
 }
 
-impl BoundsRow {
+impl LightBoundsPacket {
     const EMPTY: Self = Self {
         center: [[0.0; PACKET_SIZE]; 3],
         radius: [0.0; PACKET_SIZE],
@@ -58,7 +58,7 @@ impl BoundsRow {
         end: [1.0; PACKET_SIZE],
     };
 
-    /// The bounds of one lane, in all lanes.
+    /// Broadcasts one lane to all lanes.
     #[inline(always)]
     fn splat(&self, i: usize) -> Self {
         Self {
@@ -83,85 +83,85 @@ fn splat3(v: Vec3) -> Vec3x16 {
 
 /// A child of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Child {
-    /// A light, by its number.
+pub enum NodeChild {
+    /// The index of a light.
     Light(u32),
-    /// A node, by its number.
-    Node(u32),
+    /// The index of a node.
+    LightTreeNode(u32),
 }
 
-/// Rounding error allowed for cosine bounds, and the least cosine that enters an importance.
-const LEAST_COSINE: f32 = 1e-3;
+/// Tolerance for rounding of cosine bounds, and the minimum cosine used in an importance.
+const MIN_COSINE: f32 = 1e-3;
 
-/// Least and greatest importance of a child that may contribute.
-const LEAST: f32 = 1e-36;
-const MOST: f32 = 1e30;
+/// Minimum and maximum importance of a child that may contribute.
+const MIN_IMPORTANCE: f32 = 1e-36;
+const MAX_IMPORTANCE: f32 = 1e30;
 
-/// Greatest square of a distance that counts.
-const GREATEST: f32 = 1e37;
+/// Maximum squared distance.
+const MAX_SQUARED_DISTANCE: f32 = 1e37;
 
-/// A point of a surface that receives light.
+/// A surface point that receives light.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
     /// Position.
     pub point: Vec3,
-    /// Unit normal for the cosines.
+    /// Unit normal of the surface.
     pub normal: Vec3,
-    /// The glossy lobe. `None` if the surface has none, or it is unknown.
-    pub lobe: Option<Lobe>,
+    /// The glossy lobe. `None` if the surface has none or it is not known.
+    pub lobe: Option<ReceiverLobe>,
 }
 
-/// A glossy lobe beside a diffuse one.
+/// A glossy lobe in addition to a diffuse one.
 #[derive(Clone, Copy, Debug)]
-pub struct Lobe {
+pub struct ReceiverLobe {
     /// Unit direction of the lobe's axis.
     pub axis: Vec3,
-    /// The exponent of its cosine.
+    /// Exponent of its cosine.
     pub shininess: f32,
-    /// Its peak, divided by the value of the diffuse lobe beside it, or by 1 if `diffuse` is 0.
+    /// Its peak, relative to the diffuse lobe, or absolute if `diffuse` is 0.
     pub peak: f32,
-    /// 1, or 0 if there is no diffuse lobe.
+    /// 1 with a diffuse lobe, 0 without.
     pub diffuse: f32,
 }
 
 impl Receiver {
-    /// A receiver of which only position and normal are known.
+    /// A receiver of which only the position and normal are known.
     #[inline(always)]
     pub fn plain(point: Vec3, normal: Vec3) -> Self {
         Self { point, normal, lobe: None }
     }
 }
 
-/// [`Receiver`]s, side by side.
+/// A packet of [`Receiver`]s.
 #[derive(Clone, Debug)]
-pub struct ReceiverRow {
+pub struct ReceiverPacket {
     /// Positions.
     pub point: Vec3x16,
     /// Unit normals.
     pub normal: Vec3x16,
-    lobes: LobeRow,
+    lobes: LobePacket,
 }
 
-/// [`Lobe`]s, side by side.
+/// A packet of [`ReceiverLobe`]s.
 #[derive(Clone, Debug)]
-struct LobeRow {
+struct LobePacket {
     axis: Vec3x16,
     shininess: F32x16,
     peak: F32x16,
     diffuse: F32x16,
 }
 
-impl ReceiverRow {
-    /// Receivers of which only positions and normals are known.
+impl ReceiverPacket {
+    /// Receivers of which only the positions and normals are known.
     #[inline(always)]
     pub fn plain(point: &Vec3x16, normal: &Vec3x16) -> Self {
-        Self { point: *point, normal: *normal, lobes: LobeRow::NONE }
+        Self { point: *point, normal: *normal, lobes: LobePacket::NONE }
     }
 
-    /// Sets a glossy lobe.
+    /// Sets the glossy lobe of a lane.
     #[inline(always)]
-    pub fn set_lobe(&mut self, i: usize, lobe: &Lobe) {
-        let LobeRow { axis, shininess, peak, diffuse } = &mut self.lobes;
+    pub fn set_lobe(&mut self, i: usize, lobe: &ReceiverLobe) {
+        let LobePacket { axis, shininess, peak, diffuse } = &mut self.lobes;
         set_lane(axis, i, lobe.axis);
         (shininess[i], peak[i], diffuse[i]) = (lobe.shininess, lobe.peak, lobe.diffuse);
     }
@@ -170,8 +170,8 @@ impl ReceiverRow {
     #[inline(always)]
     fn splat(receiver: &Receiver) -> Self {
         let mut row = Self::plain(&splat3(receiver.point), &splat3(receiver.normal));
-        if let Some(Lobe { axis, shininess, peak, diffuse }) = receiver.lobe {
-            row.lobes = LobeRow {
+        if let Some(ReceiverLobe { axis, shininess, peak, diffuse }) = receiver.lobe {
+            row.lobes = LobePacket {
                 axis: splat3(axis),
                 shininess: [shininess; PACKET_SIZE],
                 peak: [peak; PACKET_SIZE],
@@ -182,8 +182,8 @@ impl ReceiverRow {
     }
 }
 
-impl LobeRow {
-    /// Lobes of no surface.
+impl LobePacket {
+    /// Lanes without a glossy lobe.
     const NONE: Self = Self {
         axis: [[0.0; PACKET_SIZE]; 3],
         shininess: [0.0; PACKET_SIZE],
@@ -191,8 +191,8 @@ impl LobeRow {
         diffuse: [1.0; PACKET_SIZE],
     };
 
-    /// Upper bound on, and estimate of, a lobe's response to light within an angle of a direction: cosⁿ δ lies below
-    /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and never 0.
+    /// A lobe's response to light within an angle δ of a direction, as both an upper bound and an estimate: cosⁿ δ is at most (1
+    /// + n(1 − cos δ)/8)⁻⁸, which is at least as wide as the lobe of a few lights and never 0.
     #[inline(always)]
     fn value(&self, i: usize, cos: f32, sin: f32) -> f32 {
         let short = 1.0 - cos - sin;
@@ -204,27 +204,27 @@ impl LobeRow {
     }
 }
 
-/// Expected contributions of children at a point.
-pub struct Expected {
-    /// Importance in a unit of the tree; 0 only if the child certainly contributes nothing.
+/// Expected contributions of a node's children at a point.
+pub struct ExpectedContributions {
+    /// Importance, in the tree's unit of power; 0 only if the child certainly contributes nothing.
     pub importance: F32x16,
-    /// Squares of the sines of half the angles that the spheres subtend; 1 inside.
+    /// Squared sines of half the angles that the spheres subtend; 1 for points inside.
     pub nearness: F32x16,
 }
 
-impl Node {
-    /// A node without children, in a tree of so many lights.
+impl LightTreeNode {
+    /// A node without children, in a tree with `leaves` lights.
     pub fn empty(leaves: u32) -> Self {
         Self {
-            bounds: BoundsRow::EMPTY,
+            bounds: LightBoundsPacket::EMPTY,
             is_plain: true,
-            children: [Child::Light(u32::MAX); PACKET_SIZE],
+            children: [NodeChild::Light(u32::MAX); PACKET_SIZE],
             first: [leaves; PACKET_SIZE],
             count: 0,
         }
     }
 
-    /// Sets a child; `unit` is that of powers, about the power of the whole tree.
+    /// Sets a child. `unit` is the unit of power, about the power of the whole tree.
     pub fn set(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
         let LightBounds { space, center, radius, power, cone } = bounds;
         let own = &mut self.bounds;
@@ -232,39 +232,39 @@ impl Node {
         let rounding = center.abs().max_element() * 2.0 * f64::from(f32::EPSILON);
         own.radius[i] = ((radius + rounding) * 1.000_001) as f32;
         (own.is_place[i], own.weakens[i]) = match space {
-            Space::Weakening => (1.0, 1.0),
-            Space::Steady => (1.0, 0.0),
-            Space::Beyond => (0.0, 0.0),
+            DistanceFalloff::InverseSquare => (1.0, 1.0),
+            DistanceFalloff::Constant => (1.0, 0.0),
+            DistanceFalloff::Beyond => (0.0, 0.0),
         };
-        own.power[i] = ((power / unit) as f32).max(LEAST);
-        own.spread[i] = 0.25 / own.radius[i].max(LEAST);
-        self.is_plain &= *space == Space::Weakening && cone.cos <= -1.0;
+        own.power[i] = ((power / unit) as f32).max(MIN_IMPORTANCE);
+        own.spread[i] = 0.25 / own.radius[i].max(MIN_IMPORTANCE);
+        self.is_plain &= *space == DistanceFalloff::InverseSquare && cone.cos <= -1.0;
         set_lane(&mut own.axis, i, cone.axis.as_vec3());
         own.cos[i] = cone.cos as f32;
         own.sin[i] = ((1.0 - cone.cos) * (1.0 + cone.cos)).max(0.0).sqrt() as f32;
         own.end[i] = match cone.edge {
-            Edge::Sharp => 1.0,
-            Edge::Cosine => 0.0,
+            ConeEdge::Sharp => 1.0,
+            ConeEdge::Cosine => 0.0,
         };
     }
 
-    /// Importance of its children for a point of a surface: power by distance, by the mean cosine at the surface, by the least
-    /// angle between the cone of emission and a direction from there (section 4.2, with bounds of cosines), and by the lobe's
-    /// response. Never 0 if light of the child might arrive.
+    /// Importance of the children for a surface point: power × distance falloff × mean cosine at the surface × cosine of the
+    /// smallest angle between the emission cone and a direction from the child (section 4.2, with bounds on cosines) × the lobe's
+    /// response. Never 0 if light from the child might arrive.
     #[inline(always)]
-    pub fn expected(&self, receiver: &Receiver) -> Expected {
-        let receivers = ReceiverRow::splat(receiver);
+    pub fn expected(&self, receiver: &Receiver) -> ExpectedContributions {
+        let receivers = ReceiverPacket::splat(receiver);
         expected(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
 
-    /// [`Node::expected`] of one child for points of surfaces, side by side.
+    /// [`LightTreeNode::expected`] of one child for a packet of surface points.
     #[inline(always)]
-    pub fn expected_of(&self, child: usize, receivers: &ReceiverRow, has_lobes: bool) -> F32x16 {
+    pub fn expected_for_child(&self, child: usize, receivers: &ReceiverPacket, has_lobes: bool) -> F32x16 {
         expected(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
     }
 
-    /// The child that a leaf is under, by its place in the order of the tree.
-    pub fn child_over(&self, place: u32) -> usize {
+    /// The child above the leaf at `place` in tree order.
+    pub fn child_above(&self, place: u32) -> usize {
         let after = self.first[1..].iter().position(|&first| first > place);
         after.unwrap_or(PACKET_SIZE - 1)
     }
@@ -272,7 +272,12 @@ impl Node {
 
 /// Importance of lights for receivers, lane by lane.
 #[inline(always)]
-fn expected(bounds: &BoundsRow, receivers: &ReceiverRow, is_plain: bool, has_lobes: bool) -> Expected {
+fn expected(
+    bounds: &LightBoundsPacket,
+    receivers: &ReceiverPacket,
+    is_plain: bool,
+    has_lobes: bool,
+) -> ExpectedContributions {
     match (is_plain, has_lobes) {
         (true, false) => expected_as::<true, false>(bounds, receivers),
         (false, false) => expected_as::<false, false>(bounds, receivers),
@@ -283,10 +288,10 @@ fn expected(bounds: &BoundsRow, receivers: &ReceiverRow, is_plain: bool, has_lob
 
 #[inline(always)]
 fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
-    bounds: &BoundsRow,
-    receivers: &ReceiverRow,
-) -> Expected {
-    let ReceiverRow { point, normal, lobes } = receivers;
+    bounds: &LightBoundsPacket,
+    receivers: &ReceiverPacket,
+) -> ExpectedContributions {
+    let ReceiverPacket { point, normal, lobes } = receivers;
     let mut offset = bounds.center;
     for axis in 0..3 {
         for i in 0..PACKET_SIZE {
@@ -294,11 +299,11 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
             offset[axis][i] = bounds.center[axis][i] - start;
         }
     }
-    // Compute squared distances, not below the squared radius, and the components along the normal.
+    // Compute squared distances (at least the squared radius) and components along the normal.
     let [mut square, mut least, mut along] = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         square[i] = lane(&offset, i).length_squared();
-        least[i] = at_least(bounds.radius[i] * bounds.radius[i], LEAST);
+        least[i] = at_least(bounds.radius[i] * bounds.radius[i], MIN_IMPORTANCE);
         along[i] = lane(normal, i).dot(lane(&offset, i));
     }
     let mut inverse = square;
@@ -306,16 +311,16 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         inverse[i] = at_least(square[i], least[i]);
     }
     inverse_roots(&mut inverse);
-    // `towards` is positive if θ − β < 90°, and above 1 if θ < β, with β half of the angle that the sphere subtends. From
-    // inside there is light in every direction.
+    // `towards` is positive if θ − β < 90° and above 1 if θ < β, where β is half the angle that the sphere subtends. Inside the
+    // sphere, light arrives from every direction.
     let [mut sin, mut towards, mut mean] = [[0.0; PACKET_SIZE]; 3];
     for i in 0..PACKET_SIZE {
         sin[i] = bounds.radius[i] * inverse[i];
         let straight = along[i] * inverse[i];
         let sum = straight + sin[i];
         towards[i] = if square[i] <= least[i] { 1.0 } else { sum };
-        // Cosines at the points of a sphere are uniform between the least and the greatest; those below 0 contribute
-        // nothing.
+        // The cosines at the points of a sphere are uniformly distributed between the minimum and the maximum; negative ones
+        // contribute nothing.
         let above = at_least(towards[i], 0.0);
         let cut = above * above * bounds.spread[i] * at_least(square[i], least[i]) * inverse[i];
         mean[i] = if straight > sin[i] { straight } else { cut };
@@ -329,7 +334,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
         for i in 0..PACKET_SIZE {
             cos[i] = -lane(&bounds.axis, i).dot(lane(&offset, i)) * inverse[i];
-            without[i] = at_least(1.0 - cos[i] * cos[i], LEAST);
+            without[i] = at_least(1.0 - cos[i] * cos[i], MIN_IMPORTANCE);
         }
         let rest = without;
         inverse_roots(&mut without);
@@ -348,22 +353,22 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     }
     let (mut importance, mut nearness) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
     for i in 0..PACKET_SIZE {
-        let value = at_most(at_least(value[i], LEAST), MOST);
-        let arrives = (towards[i] > -LEAST_COSINE)
-            & (IS_PLAIN | (away[i] > bounds.end[i] - LEAST_COSINE))
+        let value = at_most(at_least(value[i], MIN_IMPORTANCE), MAX_IMPORTANCE);
+        let arrives = (towards[i] > -MIN_COSINE)
+            & (IS_PLAIN | (away[i] > bounds.end[i] - MIN_COSINE))
             & (bounds.power[i] > 0.0);
         importance[i] = if arrives { value } else { 0.0 };
         nearness[i] = sin[i] * sin[i];
     }
-    Expected { importance, nearness }
+    ExpectedContributions { importance, nearness }
 }
-/// 1/√x of numbers from [`LEAST`] on, within a few units of the last place, by Newton's method: a root and a division of sixteen
-/// numbers would take longer than all other work on children.
+/// 1/√x for x ≥ [`MIN_IMPORTANCE`], accurate to a few ulps, with Newton's method. Square roots and divisions of 16 numbers would take
+/// longer than the rest of the node test.
 #[inline(always)]
 fn inverse_roots(x: &mut F32x16) {
     for i in 0..PACKET_SIZE {
         let x = &mut x[i];
-        let square = at_most(*x, GREATEST);
+        let square = at_most(*x, MAX_SQUARED_DISTANCE);
         let half = 0.5 * square;
         let root = f32::from_bits(0x5f37_5a86_u32.wrapping_sub(square.to_bits() >> 1));
         let root = root * (1.5 - half * root * root);
@@ -375,7 +380,7 @@ fn inverse_roots(x: &mut F32x16) {
 /// Clamps the bound of a cosine.
 #[inline(always)]
 fn cosine(bound: f32) -> f32 {
-    at_most(at_least(bound, LEAST_COSINE), 1.0)
+    at_most(at_least(bound, MIN_COSINE), 1.0)
 }
 
 #[inline(always)]
@@ -393,10 +398,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn inverse_roots_are_those_of_a_division() {
+    fn inverse_roots_match_exact_division() {
         for exponent in -35..37 {
             let mut x: F32x16 = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
-            let expected = x.map(|x| (1.0 / f64::from(at_most(x, GREATEST)).sqrt()) as f32);
+            let expected = x.map(|x| (1.0 / f64::from(at_most(x, MAX_SQUARED_DISTANCE)).sqrt()) as f32);
             inverse_roots(&mut x);
             for (root, expected) in x.iter().zip(expected) {
                 assert!((root / expected - 1.0).abs() < 4.0 * f32::EPSILON, "{root} {expected}");

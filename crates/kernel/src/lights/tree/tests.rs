@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::bounds::{Edge, Space};
+use super::bounds::{ConeEdge, DistanceFalloff};
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
@@ -12,10 +12,10 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::{Falloff, PointLight, SpotLight};
 use crate::lights::infinite::{DirectionalLight, Environment};
-use crate::lights::{AreaLight, Emitter, Light, Lights, MeshEmitter, Part, Side, area_light};
+use crate::lights::{AreaLight, Emitter, Light, LightPart, Lights, MeshEmitter, Side, area_light};
 use crate::math::{DVec3, Vec3, random};
 
-/// A light of a random kind, size and position.
+/// A light of random kind, size and position.
 fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
     let mut vector =
         |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale)).as_dvec3();
@@ -41,7 +41,7 @@ fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
         8 => Shape::Box(Cuboid::new(place, across.abs() * size + 0.001, direction * 90.0)),
         _ => Shape::Cylinder(Cylinder::new(place, place + direction * size, size * 0.3, true)),
     };
-    Light::Area(area_light(&shape, color, object).expect("it has an end"))
+    Light::Area(area_light(&shape, color, object).expect("a finite shape"))
 }
 
 fn lights_of(count: u32, next: &mut impl FnMut() -> f32) -> Vec<Light> {
@@ -54,33 +54,33 @@ fn tree_of(lights: &[Light]) -> LightTree {
         .expect("some light")
 }
 
-/// A point of a surface and its normal.
+/// A random surface point and normal.
 fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
     let mut vector = |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale));
     (vector(5.0), vector(1.0).normalize())
 }
 
-/// Nodes of cuts: enough for some trees, too few for others.
+/// Cut size: enough for some trees, too small for others.
 const NODES: usize = 12;
 
 /// A cut for a point.
-fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> Cut<'_> {
-    let mut cut = Cut::new(tree, nodes);
-    // Its previous point leaves no traces.
-    cut.go_to(&Receiver::plain(normal, point));
-    cut.go_to(&Receiver::plain(point, normal));
+fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> LightTreeCut<'_> {
+    let mut cut = LightTreeCut::new(tree, nodes);
+    // Visit another point first: it must leave no trace.
+    cut.move_to(&Receiver::plain(normal, point));
+    cut.move_to(&Receiver::plain(point, normal));
     cut
 }
 
-/// Lights and probabilities of [`Cut::pick`], by place.
-fn picks_of<const N: usize>(cut: &Cut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
+/// Lights and probabilities from [`LightTreeCut::pick`], per number.
+fn picks_of<const N: usize>(cut: &LightTreeCut<'_>, u: &[f64; N]) -> [Option<(u32, f32)>; N] {
     let mut picks = [None; N];
     cut.pick(u.iter().copied(), |place, light, probability| picks[place] = Some((light, probability)));
     picks
 }
 
-/// Evenly spread numbers.
-fn even<const N: usize>() -> [f64; N] {
+/// Evenly spaced numbers.
+fn evenly_spaced<const N: usize>() -> [f64; N] {
     std::array::from_fn(|k| (k as f64 + 0.5) / N as f64)
 }
 
@@ -88,7 +88,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn picks_have_their_probabilities_which_sum_to_one(seed in any::<u64>(), count in 1_u32..600) {
+    fn pick_probabilities_are_exact_and_sum_to_one(seed in any::<u64>(), count in 1_u32..600) {
         let mut next = random::unit(seed);
         let lights = lights_of(count, &mut next);
         let tree = tree_of(&lights);
@@ -96,7 +96,7 @@ proptest! {
             let (point, normal) = place(&mut next);
             let cut = cut_for(&tree, point, normal, NODES);
             let mut dark = [0.0; 2];
-            for (k, u) in even::<512>().into_iter().enumerate() {
+            for (k, u) in evenly_spaced::<512>().into_iter().enumerate() {
                 let alone = tree.pick(&Receiver::plain(point, normal), u);
                 if let Some(pick) = alone {
                     prop_assert_eq!(pick.probability, tree.probability(&Receiver::plain(point, normal), pick.light));
@@ -105,7 +105,7 @@ proptest! {
                     dark[0] += 1.0 / 512.0;
                 }
                 if k == 0 {
-                    for pick in picks_of(&cut, &even::<512>()) {
+                    for pick in picks_of(&cut, &evenly_spaced::<512>()) {
                         if let Some((light, probability)) = pick {
                             prop_assert_eq!(probability, cut.probability(light));
                             prop_assert!(probability > 0.0);
@@ -115,7 +115,7 @@ proptest! {
                     }
                 }
             }
-            // The rest of the probability goes to nodes whose bounds promise more than their lights send.
+            // The missing probability is that of nodes whose bounds promise light that their children do not send.
             let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::plain(point, normal), light)).sum();
             let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
             prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
@@ -124,14 +124,14 @@ proptest! {
     }
 
     #[test]
-    fn what_can_arrive_can_be_picked(seed in any::<u64>(), count in 1_u32..200) {
+    fn every_contributing_light_can_be_picked(seed in any::<u64>(), count in 1_u32..200) {
         let mut next = random::unit(seed);
         let lights = lights_of(count, &mut next);
         let tree = tree_of(&lights);
         for _ in 0..4 {
             let (mut point, normal) = place(&mut next);
-            // Also close to one of them.
-            if let (true, Some((crate::lights::Middle::At(middle), _))) = (next() < 0.5, lights[0].middle()) {
+            // Also test points close to a light.
+            if let (true, Some((crate::lights::LightCenter::At(middle), _))) = (next() < 0.5, lights[0].middle()) {
                 point = middle + point * 0.01;
             }
             let cut = cut_for(&tree, point, normal, NODES);
@@ -150,9 +150,9 @@ proptest! {
 }
 
 #[test]
-fn spotlights_above_each_other_are_picked_from_between_them() {
-    // Lights stand in columns, all pointing down, as a node holds those of one column: a point below the first of them is above
-    // the middle of the node.
+fn stacked_spotlights_are_picked_from_in_between() {
+    // The lights form columns, one node each, all pointing down. A point below the lowest light that reaches it may be above the
+    // center of the node.
     let mut next = random::unit(8);
     let spot = |i: u32| {
         let position = DVec3::new(f64::from(i % 16), 0.5 + f64::from(i / 16), 0.0);
@@ -179,7 +179,7 @@ fn spotlights_above_each_other_are_picked_from_between_them() {
 }
 
 #[test]
-fn picks_come_as_often_as_their_probabilities_say() {
+fn pick_frequencies_match_probabilities() {
     let mut next = random::unit(3);
     let lights = lights_of(300, &mut next);
     let tree = tree_of(&lights);
@@ -224,7 +224,7 @@ fn picks_come_as_often_as_their_probabilities_say() {
             } else {
                 assert!(few.0 < 20.0, "{few:?}");
             }
-            // Mean and variance of χ² are the cells less one, and twice that.
+            // χ² has mean n and variance 2n, where n is the number of cells − 1.
             assert!(
                 cells > 10.0 && chi < cells + 4.5 * (2.0 * cells).sqrt(),
                 "{round} {way}: {chi} of {cells} cells"
@@ -234,14 +234,14 @@ fn picks_come_as_often_as_their_probabilities_say() {
 }
 
 #[test]
-fn lights_that_send_nothing_are_not_picked() {
-    // Over a floor: lamps under it, lamps that look away, spots that shine past the point.
+fn lights_without_contribution_are_not_picked() {
+    // Above a floor: lights below it, lights facing away, and spotlights aimed past the point.
     let (point, normal) = (Vec3::ZERO, Vec3::Y);
     let at = |x: f64, y: f64| DVec3::new(x, y, 0.5);
     let point_at = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let disk = |place, normal| {
         let disk = Shape::Disk(Disk::new(place, normal, 0.05));
-        Light::Area(area_light(&disk, Vec3::ONE, 0).expect("it has an end"))
+        Light::Area(area_light(&disk, Vec3::ONE, 0).expect("a finite shape"))
     };
     let spot =
         |place, axis| Light::Spot(SpotLight { point: point_at(place), axis, half_angle: 0.3, blend: 0.2 });
@@ -263,13 +263,13 @@ fn lights_that_send_nothing_are_not_picked() {
         assert!(number % 5 > 2 || tree.probability(&Receiver::plain(point, normal), number) == 0.0);
         sum += probability;
     }
-    // Hardly anything goes to nodes without light.
+    // Almost no probability is lost to nodes without light.
     assert!(sum > 0.7, "{sum}");
 }
 
 #[test]
-fn what_is_nearer_and_stronger_is_picked_in_proportion() {
-    // Points straight above a floor: E = I/h².
+fn picks_are_proportional_to_irradiance() {
+    // Point lights directly above a floor: E = I/h².
     let at = |height: f64, intensity: f32| {
         let position = DVec3::new(0.0, height, 0.0);
         Light::Point(PointLight { position, intensity: Vec3::splat(intensity), falloff: Falloff::Square })
@@ -287,7 +287,7 @@ fn what_is_nearer_and_stronger_is_picked_in_proportion() {
 }
 
 #[test]
-fn picks_are_the_same_where_all_is_scaled_by_powers_of_two() {
+fn picks_are_invariant_to_power_of_two_scaling() {
     let probabilities = |k: i32| {
         let mut next = random::unit(5);
         let (unit, power) = (2_f64.powi(k), 4_f32.powi(k));
@@ -298,7 +298,7 @@ fn picks_are_the_same_where_all_is_scaled_by_powers_of_two() {
                 Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
             })
             .collect();
-        // Light from beyond the scene has no position and no size.
+        // A light at infinity has no position and no size.
         let sun = DirectionalLight::new(Vec3::new(0.6, 0.8, 0.0), Vec3::splat(3.0), 0.0);
         lights.push(Light::Directional(sun));
         let tree = tree_of(&lights);
@@ -312,17 +312,17 @@ fn picks_are_the_same_where_all_is_scaled_by_powers_of_two() {
 }
 
 #[test]
-fn bounds_around_lights_hold_all_of_them() {
+fn joint_bounds_contain_all_lights() {
     let mut next = random::unit(11);
     for _ in 0..200 {
         let bounds: Vec<LightBounds> = lights_of(20, &mut next).iter().filter_map(Light::bounds).collect();
-        for space in [Space::Weakening, Space::Steady, Space::Beyond] {
+        for space in [DistanceFalloff::InverseSquare, DistanceFalloff::Constant, DistanceFalloff::Beyond] {
             let own: Vec<_> = bounds.iter().filter(|one| one.space == space).copied().collect();
             let Some(all) = LightBounds::around(own.iter()) else { continue };
             for one in &own {
                 let reach = (one.center - all.center).length() + one.radius;
                 assert!(reach <= all.radius * (1.0 + 1e-12), "{one:?} {all:?}");
-                // Any direction of the cone is in the cone around all.
+                // Every direction of the cone must be inside the joint cone.
                 let turned = one.cone.axis.dot(all.cone.axis).clamp(-1.0, 1.0).acos() + one.cone.cos.acos();
                 assert!(turned.min(std::f64::consts::PI).cos() >= all.cone.cos - 1e-9, "{one:?} {all:?}");
                 assert!(all.cone.edge >= one.cone.edge);
@@ -330,14 +330,14 @@ fn bounds_around_lights_hold_all_of_them() {
         }
     }
     assert_eq!(LightBounds::around([].iter()), None);
-    assert!(Edge::Cosine > Edge::Sharp);
+    assert!(ConeEdge::Cosine > ConeEdge::Sharp);
 }
 
 #[test]
-fn lights_in_one_place_and_lights_far_apart_have_a_tree() {
+fn coincident_and_distant_lights_have_trees() {
     let point = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let same: Vec<Light> = (0..5000).map(|_| Light::Point(point(DVec3::ONE))).collect();
-    // Each light is twice as far as the one before.
+    // Each light is twice as far away as the previous one.
     let apart: Vec<Light> =
         (0..120).map(|i| Light::Point(point(DVec3::splat(1e-18 * 2_f64.powi(i))))).collect();
     for lights in [same, apart] {
@@ -351,7 +351,7 @@ fn lights_in_one_place_and_lights_far_apart_have_a_tree() {
 }
 
 #[test]
-fn a_tree_that_nobody_waits_for_is_not_built() {
+fn canceled_builds_return_an_error() {
     let mut next = random::unit(2);
     let bounds: Vec<_> = lights_of(100, &mut next).iter().map(Light::bounds).collect();
     let token = CancelToken::new();
@@ -362,30 +362,30 @@ fn a_tree_that_nobody_waits_for_is_not_built() {
 }
 
 #[test]
-fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
-    use crate::lights::ReceiverRow;
+fn packet_picks_match_single_picks() {
+    use crate::lights::ReceiverPacket;
     let mut next = random::unit(21);
     let mut picked = 0;
     for count in [1, 2, 9, 13, 16] {
         let lights = lights_of(count, &mut next);
         let tree = tree_of(&lights);
-        assert!(tree.is_flat());
+        assert!(tree.is_single_node());
         for round in 0..60 {
             let receivers: [Receiver; PACKET_SIZE] = std::array::from_fn(|i| {
                 let (point, normal) = place(&mut next);
                 let (_, axis) = place(&mut next);
-                let lobe = Lobe { axis, shininess: 20.0 * next(), peak: 3.0 * next(), diffuse: 1.0 };
+                let lobe = ReceiverLobe { axis, shininess: 20.0 * next(), peak: 3.0 * next(), diffuse: 1.0 };
                 Receiver { point, normal, lobe: (round % 2 == 0 && i % 3 != 0).then_some(lobe) }
             });
             let column = |of: &dyn Fn(&Receiver) -> Vec3| {
                 let vectors = receivers.each_ref().map(|receiver| of(receiver).to_array());
                 [0, 1, 2].map(|axis| vectors.map(|vector| vector[axis]))
             };
-            let mut row = ReceiverRow::plain(&column(&|one| one.point), &column(&|one| one.normal));
+            let mut row = ReceiverPacket::plain(&column(&|one| one.point), &column(&|one| one.normal));
             for (i, receiver) in receivers.iter().enumerate() {
                 receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
             }
-            let shares = tree.flat_shares(&row, round % 2 == 0).expect("one node");
+            let shares = tree.single_node_importance(&row, round % 2 == 0).expect("one node");
             let numbers: [f64; PACKET_SIZE] = std::array::from_fn(|_| f64::from(next()));
             let picks = shares.pick(&numbers);
             assert_eq!(shares.probabilities(&picks), picks.probabilities);
@@ -401,21 +401,21 @@ fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
                     "{} {own}",
                     picks.probabilities[i]
                 );
-                // Sums in another order may make a number fall on the next light.
+                // Sums in a different order may shift a number to the next light.
                 picked += u32::from(alone.light == picks.lights[i]);
             }
             let greatest = shares.pick(&[1.0_f64.next_down(); PACKET_SIZE]);
             for (i, receiver) in receivers.iter().enumerate() {
                 let own = tree.probability(receiver, greatest.lights[i]);
-                assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "the last light that arrives");
+                assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "the last light that contributes");
             }
         }
     }
-    assert!(picked > 3000, "{picked} picks are the same");
-    assert!(!tree_of(&lights_of(17, &mut next)).is_flat());
+    assert!(picked > 3000, "{picked} equal picks");
+    assert!(!tree_of(&lights_of(17, &mut next)).is_single_node());
 }
 
-/// A wide and a near mesh of uneven triangles.
+/// A mesh of triangles of very different sizes, near and far.
 fn uneven_mesh(count: u32) -> MeshEmitter {
     let mut next = random::signed(8);
     let mut corner = |scale: f64| DVec3::new(f64::from(next()), f64::from(next()), f64::from(next())) * scale;
@@ -427,7 +427,7 @@ fn uneven_mesh(count: u32) -> MeshEmitter {
 }
 
 #[test]
-fn the_density_of_a_mesh_is_that_of_its_samples() {
+fn mesh_pdf_matches_its_samples() {
     for count in [20, 500] {
         let mesh = uneven_mesh(count);
         assert_eq!(mesh.tree().is_some(), count > 32);
@@ -437,7 +437,7 @@ fn the_density_of_a_mesh_is_that_of_its_samples() {
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::ONE,
             object: 4,
-            part: Part::Listed,
+            part: LightPart::Listed,
             bounds,
             texture: None,
         };
@@ -445,8 +445,8 @@ fn the_density_of_a_mesh_is_that_of_its_samples() {
         for _ in 0..2000 {
             let (point, normal) = place(&mut next);
             let Some(sample) = light.sample(point, normal, [next(), next()]) else { continue };
-            let crate::lights::End::At(target) = sample.end else { panic!("a mesh is somewhere") };
-            let crate::lights::Source::Primitive(4, primitive) = sample.source else {
+            let crate::lights::ShadowRayEnd::At(target) = sample.end else { panic!("a finite light") };
+            let crate::lights::LightObject::Primitive(4, primitive) = sample.source else {
                 panic!("a triangle of it")
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };

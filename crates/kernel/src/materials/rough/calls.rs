@@ -1,9 +1,9 @@
-//! Functions of rows, in the place that calls them or once for each instruction set, as [`RoughRow::IS_COPIED`] says.
+//! Calls packet functions either inlined or through one copy per instruction set, as [`RoughRow::IS_COPIED`] says.
 
 use crate::materials::bsdf::{BsdfValues, LobeSet, RoughRow};
 use crate::math::lanes::{F32x16, Simd, SimdKernel, Vec3x16};
 
-/// The functions of [`RoughRow`] that are large, for all kinds.
+/// The large functions of [`RoughRow`], for all kinds.
 pub(super) trait RoughCalls: RoughRow {
     /// [`RoughRow::f`].
     #[inline(always)]
@@ -58,7 +58,7 @@ pub(super) trait RoughCalls: RoughRow {
 
 impl<R: RoughRow> RoughCalls for R {}
 
-/// A call of [`RoughRow::f`].
+/// Kernel of [`RoughRow::f`].
 struct Evaluation<'a, R> {
     row: &'a R,
     directions: &'a Vec3x16,
@@ -73,7 +73,7 @@ impl<R: RoughRow> SimdKernel for Evaluation<'_, R> {
     }
 }
 
-/// A call of [`RoughRow::parts`].
+/// Kernel of [`RoughRow::parts`].
 struct Division<'a, R> {
     row: &'a R,
     directions: &'a Vec3x16,
@@ -89,7 +89,7 @@ impl<R: RoughRow> SimdKernel for Division<'_, R> {
     }
 }
 
-/// A call of [`RoughRow::pdf`].
+/// Kernel of [`RoughRow::pdf`].
 struct Density<'a, R> {
     row: &'a R,
     lobes: LobeSet,
@@ -107,7 +107,7 @@ impl<R: RoughRow> SimdKernel for Density<'_, R> {
     }
 }
 
-/// A call of [`RoughRow::sample`].
+/// Kernel of [`RoughRow::sample`].
 struct Sampling<'a, R> {
     row: &'a R,
     lobes: LobeSet,

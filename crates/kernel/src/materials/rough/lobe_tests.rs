@@ -1,4 +1,5 @@
-//! Checks of lobes of microfacets, for the tests of each kind: against a reference in `f64`, of samples against pdfs, and of albedos.
+//! Checks for microfacet lobes, shared by the tests of each kind: values against an `f64` reference, samples against pdfs, and
+//! albedos.
 
 use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes, SideSamples};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
@@ -7,23 +8,23 @@ use crate::math::{DVec3, Vec3};
 
 use std::f64::consts::{PI, TAU};
 
-/// The values of α of the checks.
+/// The values of α to test.
 pub const ALPHAS: [f32; 7] = [0.001, 0.004, 0.02, 0.05, 0.2, 0.5, 1.0];
 
-/// The cosines of the checks.
+/// The view cosines to test.
 pub const COSINES: [f64; 5] = [0.05, 0.15, 0.4, 0.8, 1.0];
 
-/// Tangent of the surfaces of the checks, along x.
+/// Tangent of the test surfaces, along x.
 const TANGENT: Vec3 = Vec3::new(3.0, 0.0, 0.5);
 
-/// A unit direction by its cosine and azimuth.
+/// A unit direction, from its cosine with z and its azimuth.
 pub fn direction(cosine: f64, azimuth: f64) -> DVec3 {
     let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
     let (sin, cos) = libm::sincos(azimuth);
     DVec3::new(sine * cos, sine * sin, cosine)
 }
 
-/// D·G/(4 cosθᵢ cosθₒ) of the formulas as they are written, about z.
+/// D·G/(4 cosθᵢ cosθₒ) around z, as in the papers.
 pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     let half = (one + other).normalize();
     let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
@@ -35,19 +36,19 @@ pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     distribution / (1.0 + lambda(one) + lambda(other)) / (4.0 * one.z * other.z)
 }
 
-/// The light of a narrow lobe.
+/// How a narrow lobe receives light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Light {
-    /// Facets mirror it.
+pub enum LitFrom {
+    /// By reflection.
     Mirrored,
-    /// Facets refract it; the index of refraction on its side is so many times that on the viewer's.
+    /// By refraction; the ratio of the index of refraction on the light's side to that on the viewer's.
     Refracted(f64),
-    /// Facets mirror it, and it comes from the other side.
+    /// By reflection, from the other side.
     Through,
 }
 
-impl Light {
-    /// The sign of z on its side.
+impl LitFrom {
+    /// The sign of z on the light's side.
     fn side(self) -> f64 {
         match self {
             Self::Mirrored => 1.0,
@@ -56,7 +57,7 @@ impl Light {
     }
 }
 
-/// Choices of lobes and numbers for directions, in rows: a grid of `side` × `side` cells.
+/// Lobe choices and random numbers for `side` × `side` stratified samples, in packets.
 fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
     let mut next = random(5);
     (0..side * side).step_by(PACKET_SIZE).map(move |first| {
@@ -64,7 +65,7 @@ fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
         let place = |i: u32, next: f32| ((i as f32 + next) / side as f32).min(1.0 - f32::EPSILON);
         for i in 0..PACKET_SIZE as u32 {
             let number = first + i;
-            // Golden ratio: the choices are spread over the cells as well.
+            // Use the golden ratio to spread the choices over the cells.
             let choice = (f64::from(number) * 0.618_033_988_749_894_9).fract();
             choices[i as usize] = choice as f32;
             u[0][i as usize] = place(number % side, next());
@@ -78,30 +79,30 @@ fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
 pub struct SideSample {
     /// Unit direction.
     pub direction: DVec3,
-    /// Its pdf in sr⁻¹.
+    /// Pdf of the direction in sr⁻¹.
     pub density: f64,
-    /// f·cosθ over the pdf.
+    /// f·cosθ divided by the pdf.
     pub share: f64,
-    /// Whether it is on the other side than the row's light.
+    /// Whether it is on the side opposite to the packet's light.
     pub is_beyond: bool,
 }
 
-/// A surface about z, seen from a direction.
+/// A surface around z, seen from a direction.
 pub struct Subject<R: RoughRow> {
     row: R,
     to_eye: DVec3,
     alphas: [f64; 2],
-    light: Light,
+    light: LitFrom,
 }
 
 impl<R: RoughRow> Subject<R> {
-    /// The surface of a material; `alphas` are those of its narrow lobe.
+    /// A surface with this material, whose narrow lobe has these `alphas`.
     pub fn new(point: &R::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
-        Self::lit(point, alphas, to_eye, Light::Mirrored)
+        Self::lit(point, alphas, to_eye, LitFrom::Mirrored)
     }
 
-    /// [`Subject::new`] with other light.
-    pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: Light) -> Self {
+    /// [`Subject::new`] with another kind of light.
+    pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: LitFrom) -> Self {
         let mut row = R::EMPTY;
         row.reset();
         for i in 0..PACKET_SIZE {
@@ -117,12 +118,12 @@ impl<R: RoughRow> Subject<R> {
         [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [self.light.side() as f32; PACKET_SIZE]]
     }
 
-    /// The height of a direction above the surface, on the side of the light.
+    /// Cosine of a direction with the normal on the side of the light.
     fn height(&self, direction: DVec3) -> f64 {
         direction.z * self.light.side()
     }
 
-    /// f, its wide part and the pdf for light from these directions.
+    /// f, its wide part, and the pdf, for light from these directions.
     pub fn values(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
         for some in directions.chunks(PACKET_SIZE) {
@@ -148,7 +149,7 @@ impl<R: RoughRow> Subject<R> {
         all
     }
 
-    /// Directions sampled by a grid of numbers, `side` × `side`, each with all choices of lobes in turns.
+    /// Directions sampled with `side` × `side` stratified random numbers.
     pub fn samples(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
         let rows = grid(side).map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
         let mut all: Vec<DVec3> =
@@ -157,7 +158,7 @@ impl<R: RoughRow> Subject<R> {
         all
     }
 
-    /// Samples on either side, by the numbers of [`Subject::samples`].
+    /// Samples on either side, with the random numbers of [`Subject::samples`].
     pub fn side_samples(
         &self,
         side: u32,
@@ -176,12 +177,12 @@ impl<R: RoughRow> Subject<R> {
         all
     }
 
-    /// The albedo of all lobes by their samples: the mean of f·cos/pdf.
+    /// Albedo of all lobes, estimated with samples: the mean of f·cos/pdf.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
         self.mean_of(&self.samples(LobeSet::All, side))
     }
 
-    /// [`Subject::sampled_albedo`] with sixteen choices for each place of the grid.
+    /// [`Subject::sampled_albedo`] with 16 lobe choices per cell.
     pub fn albedo_by_choices(&self, side: u32) -> DVec3 {
         let mut next = random(6);
         let mut samples = Vec::new();
@@ -197,7 +198,7 @@ impl<R: RoughRow> Subject<R> {
         self.mean_of(&samples)
     }
 
-    /// The largest f·cos/pdf of samples of all lobes.
+    /// The largest f·cos/pdf among samples of all lobes.
     pub fn largest_weight(&self, side: u32) -> f64 {
         let samples = self.samples(LobeSet::All, side);
         let values = self.values(LobeSet::All, &samples);
@@ -219,12 +220,12 @@ impl<R: RoughRow> Subject<R> {
         sum / samples.len() as f64
     }
 
-    /// The albedo by quadrature of f: of the narrow lobe over half vectors, of the wide ones over directions.
+    /// Albedo by quadrature of f: over half vectors for the narrow lobe, over directions for the wide ones.
     pub fn albedo(&self) -> DVec3 {
         self.albedo_by_rings(192)
     }
 
-    /// [`Subject::albedo`] by so many rings of half vectors.
+    /// [`Subject::albedo`] with this many rings of half vectors.
     pub fn albedo_by_rings(&self, rings: u32) -> DVec3 {
         let narrow: DVec3 = self
             .half_vectors(rings, 192)
@@ -248,8 +249,8 @@ impl<R: RoughRow> Subject<R> {
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
-    /// Directions above the surface, by half vectors in equal steps of y and of the azimuth, each with the solid angle that
-    /// it stands for. (1 − y)² is the part of D outside of an angle, so that the tail has its steps.
+    /// Directions above the surface, from half vectors in equal steps of y and the azimuth, each with its solid angle. (1 − y)²
+    /// is the fraction of D outside an angle, so that the tail is covered.
     fn half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
         (0..rings * steps).filter_map(move |i| {
             let y = (f64::from(i / steps) + 0.5) / f64::from(rings);
@@ -259,7 +260,7 @@ impl<R: RoughRow> Subject<R> {
         })
     }
 
-    /// The direction at a place of the map of half vectors, and its solid angle for one unit of the map. `None` below the surface.
+    /// The direction at a point of the half-vector map, and its solid angle per unit of the map. `None` below the surface.
     pub fn at_half_vector(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
         let [u, v] = self.alphas;
         let outside = (1.0 - y) * (1.0 - y);
@@ -268,11 +269,11 @@ impl<R: RoughRow> Subject<R> {
         let half = DVec3::new(u * slope * cos, v * slope * sin, 1.0).normalize();
         let cosine = half.dot(self.to_eye);
         let mirrored = half * (2.0 * cosine) - self.to_eye;
-        // The solid angle of directions for one of half vectors.
+        // Solid angle of directions per solid angle of half vectors.
         let (direction, spread) = match self.light {
-            Light::Mirrored => (mirrored, 4.0 * cosine),
-            Light::Through => (DVec3::new(mirrored.x, mirrored.y, -mirrored.z), 4.0 * cosine),
-            Light::Refracted(eta) => {
+            LitFrom::Mirrored => (mirrored, 4.0 * cosine),
+            LitFrom::Through => (DVec3::new(mirrored.x, mirrored.y, -mirrored.z), 4.0 * cosine),
+            LitFrom::Refracted(eta) => {
                 let beyond = (eta * eta - 1.0 + cosine * cosine).sqrt();
                 if beyond.is_nan() {
                     return None;
@@ -287,13 +288,13 @@ impl<R: RoughRow> Subject<R> {
         is_seen.then(|| (direction, spread * 2.0 * (1.0 - y) / density))
     }
 
-    /// The place of a direction on the map of half vectors.
+    /// The point of a direction on the half-vector map.
     fn place(&self, direction: DVec3) -> [f64; 2] {
         let [u, v] = self.alphas;
         let sum = match self.light {
-            Light::Mirrored => direction + self.to_eye,
-            Light::Through => DVec3::new(direction.x, direction.y, -direction.z) + self.to_eye,
-            Light::Refracted(eta) => self.to_eye + direction * eta,
+            LitFrom::Mirrored => direction + self.to_eye,
+            LitFrom::Through => DVec3::new(direction.x, direction.y, -direction.z) + self.to_eye,
+            LitFrom::Refracted(eta) => self.to_eye + direction * eta,
         };
         let half = if sum.z < 0.0 { -sum } else { sum }.normalize();
         let (x, y) = (half.x / u / half.z, half.y / v / half.z);
@@ -301,11 +302,12 @@ impl<R: RoughRow> Subject<R> {
         [1.0 - 1.0 / (1.0 + slope2).sqrt(), libm::atan2(y, x).rem_euclid(TAU) / TAU]
     }
 
-    /// Compares samples with the pdf by χ² over cells of the map of half vectors: at most six standard deviations above its mean.
+    /// χ² test of samples against the pdf over cells of the half-vector map: the statistic must be at most six standard
+    /// deviations above its mean.
     pub fn check_samples(&self, what: &str, lobes: LobeSet) {
         const CELLS: u32 = 16;
-        // Before total reflection, refraction ends as a root does.
-        let fine = if let Light::Refracted(_) = self.light { 36 } else { 12 };
+        // Near total reflection, refraction has a square-root singularity.
+        let fine = if let LitFrom::Refracted(_) = self.light { 36 } else { 12 };
         let mut next = random(23);
         let mut counts = vec![0.0; (CELLS * CELLS + 1) as usize];
         let total = 400 * 400;
@@ -321,7 +323,7 @@ impl<R: RoughRow> Subject<R> {
                 counts[number as usize] += 1.0;
             }
         }
-        // Integrate the pdf over each cell; what is left is below the surface.
+        // Integrate the pdf over each cell; the remainder is below the surface.
         let side = CELLS * fine;
         let part = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
         let places: Vec<(usize, DVec3, f64)> = (0..side * side)
@@ -339,7 +341,7 @@ impl<R: RoughRow> Subject<R> {
         let above: f64 = expected.iter().sum();
         assert!(above < 1.003 * total as f64, "{what}: the pdf integrates to {}", above / total as f64);
         expected[(CELLS * CELLS) as usize] = (total as f64 - above).max(0.0);
-        // Pool the cells of few samples.
+        // Pool cells with few expected samples.
         let (mut sum, mut cells, mut rest) = (0.0, 0.0, [0.0; 2]);
         for (count, expected) in counts.iter().zip(&expected) {
             if *expected >= 20.0 {
@@ -354,7 +356,7 @@ impl<R: RoughRow> Subject<R> {
     }
 }
 
-/// Checks that light and viewer may change places, and that f is that of a reference, in many directions about the peak and all over.
+/// Checks reciprocity, and compares f with a reference, in many directions near the peak and elsewhere.
 pub fn check_values<R: RoughRow>(
     what: &str,
     point: &R::Point,
@@ -390,13 +392,13 @@ pub fn check_values<R: RoughRow>(
     }
 }
 
-/// Checks that each surface has the same bits of values, pdfs and samples among all others as alone.
+/// Checks that values, pdfs and samples of a surface do not depend on the other lanes.
 pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
-    check_neighbours_lit::<R>(points, Light::Mirrored);
+    check_neighbours_lit::<R>(points, LitFrom::Mirrored);
 }
 
-/// [`check_neighbours`] with other light.
-pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: Light) {
+/// [`check_neighbours`] with another kind of light.
+pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
     let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
     let mut next = random(31);
     for first in 0..points.len() {
@@ -426,12 +428,12 @@ pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: Light) {
             for lobes in [LobeSet::All, LobeSet::Narrow] {
                 bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
-                // Without a narrow lobe, no ray goes there.
+                // Without a narrow lobe, its sample is never used.
                 if lobes == LobeSet::All || row.narrow_lobes() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
             }
-            bits.push(row.grey(&values)[i].to_bits());
+            bits.push(row.max_component(&values)[i].to_bits());
             bits
         };
         let all = row(&|_| true);

@@ -1,4 +1,4 @@
-//! The table of rough BSDFs, and the sum of them all: an enum for a material, for a point, and for a row.
+//! The table of non-specular BSDFs, and enums over all of them: for a material, for a point, and for a packet.
 
 mod calls;
 pub mod frosted;
@@ -10,7 +10,7 @@ pub mod plastic;
 pub mod principled;
 
 pub use frosted::GlassPoint;
-pub use metal::{Metal, MetalFresnel};
+pub use metal::{Conductor, ConductorFresnel};
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
@@ -25,20 +25,21 @@ use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
 use calls::RoughCalls;
 use frosted::GlassRow;
-use metal::{BrushedMetalRow, RoundMetalRow};
+use metal::{BrushedConductorRow, IsotropicConductorRow};
 use phong::PhongRow;
 use plastic::PlasticRow;
 use principled::PrincipledRow;
 
-/// Makes the sums over all kinds of the traits, whose functions have the same meaning. Kinds that `materials` lists are those of
-/// whole materials; `parts` lists kinds that surfaces of other materials have for a part of their light. `kept` is how a [`BsdfRow`]
-/// keeps a row: the commonest kind in its place, others by pointer, so that they do not spread the rows of scenes without them.
+/// Generates enums over all kinds, whose methods dispatch to the trait methods of the same name. Kinds listed under `materials`
+/// are entire materials; `parts` lists kinds that surfaces of other materials have for a part of their light. `kept` is how a
+/// [`BsdfRow`] stores a packet: the most common kind inline, others boxed, so that they do not enlarge the packets of scenes
+/// without them.
 macro_rules! kinds {
     (
         materials { $($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)? }
         parts { $($(#[$part_doc:meta])* $part:ident($part_row:ty)),+ $(,)? }
     ) => {
-        /// Kind of a rough BSDF.
+        /// The kind of a non-specular BSDF.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum RoughKind { $($(#[$doc])* $kind,)+ $($(#[$part_doc])* $part),+ }
 
@@ -47,19 +48,19 @@ macro_rules! kinds {
             pub const ALL: &[Self] = &[$(Self::$kind,)+ $(Self::$part),+];
         }
 
-        /// A rough material of any kind.
+        /// A non-specular material of any kind.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Rough { $($(#[$doc])* $kind($material)),+ }
 
-        /// A rough material of any kind at one point.
+        /// A non-specular material of any kind at one point.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum RoughBsdf {
             $($(#[$doc])* $kind(<$row as RoughRow>::Point),)+
             $($(#[$part_doc])* $part(<$part_row as RoughRow>::Point)),+
         }
 
-        /// Rough surfaces of one kind, side by side.
-        // Phong rows stay where they are: a pointer to them would cost every scene.
+        /// A packet of non-specular surfaces of one kind.
+        // Phong packets are stored inline: boxing them would slow down every scene.
         #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
         pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<$part_row>)),+ }
@@ -77,10 +78,10 @@ macro_rules! kinds {
                 match self { $(Self::$kind(own) => RoughBsdf::$kind(own.at(at, lookups))),+ }
             }
 
-            /// [`RoughMaterial::bleached`].
+            /// [`RoughMaterial::with_white_textures`].
             #[inline]
-            pub fn bleached(&self) -> RoughBsdf {
-                match self { $(Self::$kind(own) => RoughBsdf::$kind(own.bleached())),+ }
+            pub fn with_white_textures(&self) -> RoughBsdf {
+                match self { $(Self::$kind(own) => RoughBsdf::$kind(own.with_white_textures())),+ }
             }
 
             /// [`RoughMaterial::constant`].
@@ -196,7 +197,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// Makes it a row of a kind, of any content.
+            /// Turns it into a packet of a kind, with arbitrary contents.
             #[inline(always)]
             pub fn prepare(&mut self, kind: RoughKind) {
                 if self.kind() != kind {
@@ -216,7 +217,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::put`], of a BSDF of the row's kind.
+            /// [`RoughRow::put`] for a BSDF of the packet's kind.
             #[inline(always)]
             pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, place: &Place) {
                 $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
@@ -227,7 +228,7 @@ macro_rules! kinds {
                 })+
             }
 
-            /// [`MaterialRow::fill`], with a material of the row's kind.
+            /// [`MaterialRow::fill`] with a material of the packet's kind.
             #[inline(always)]
             pub fn fill(
                 &mut self,
@@ -251,7 +252,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::copy`], from a row of the same kind.
+            /// [`RoughRow::copy`] from a packet of the same kind.
             #[inline(always)]
             pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
                 $(if let (Self::$kind(row), Self::$kind(other)) = (&mut *self, other) {
@@ -285,12 +286,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::grey`].
+            /// [`RoughRow::max_component`].
             #[inline(always)]
-            pub fn grey(&self, values: &BsdfValues) -> F32x16 {
+            pub fn max_component(&self, values: &BsdfValues) -> F32x16 {
                 match self {
-                    $(Self::$kind(row) => row.grey(values),)+
-                    $(Self::$part(row) => row.grey(values)),+
+                    $(Self::$kind(row) => row.max_component(values),)+
+                    $(Self::$part(row) => row.max_component(values)),+
                 }
             }
 
@@ -362,12 +363,12 @@ macro_rules! kinds {
                 }
             }
 
-            /// [`RoughRow::even`].
+            /// [`RoughRow::constant_f`].
             #[inline(always)]
-            pub fn even(&self, i: usize) -> Option<Vec3> {
+            pub fn constant_f(&self, i: usize) -> Option<Vec3> {
                 match self {
-                    $(Self::$kind(row) => row.even(i),)+
-                    $(Self::$part(row) => row.even(i)),+
+                    $(Self::$kind(row) => row.constant_f(i),)+
+                    $(Self::$part(row) => row.constant_f(i)),+
                 }
             }
 
@@ -385,15 +386,15 @@ macro_rules! kinds {
 
 kinds! {
     materials {
-    /// The normalised Phong model.
+    /// The normalized Phong model.
     Phong(Phong, PhongRow, kept: PhongRow),
-    /// A conductor of microfacets, the same in all azimuths.
-    Metal(Metal, RoundMetalRow, kept: Box<RoundMetalRow>),
-    /// A conductor of microfacets that are long along u or along v.
-    BrushedMetal(Metal, BrushedMetalRow, kept: Box<BrushedMetalRow>),
-    /// A diffuse base under a coat of microfacets.
+    /// An isotropic microfacet conductor.
+    Conductor(Conductor, IsotropicConductorRow, kept: Box<IsotropicConductorRow>),
+    /// A microfacet conductor stretched along u or along v.
+    BrushedConductor(Conductor, BrushedConductorRow, kept: Box<BrushedConductorRow>),
+    /// A diffuse base under a microfacet coat.
     Plastic(Plastic, PlasticRow, kept: Box<PlasticRow>),
-    /// The inputs of glTF.
+    /// A material with glTF's parameters.
     Principled(Box<Principled>, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
     }
     parts {
@@ -408,24 +409,24 @@ kinds! {
 
 impl Rough {
     /// Whether it may scatter light to its other side.
-    pub fn lets_through(&self) -> bool {
+    pub fn is_transmissive(&self) -> bool {
         match self {
-            Self::Principled(principled) => principled.lets_through(),
-            Self::Phong(_) | Self::Metal(_) | Self::BrushedMetal(_) | Self::Plastic(_) => false,
+            Self::Principled(principled) => principled.is_transmissive(),
+            Self::Phong(_) | Self::Conductor(_) | Self::BrushedConductor(_) | Self::Plastic(_) => false,
         }
     }
 }
 
 impl RoughBsdf {
-    /// The BSDF for light that comes through the surface, which is of another kind. `None` if none comes.
+    /// The BSDF for transmitted light, which is of another kind. `None` if no light is transmitted.
     #[inline(always)]
     pub fn behind(&self) -> Option<Self> {
         match self {
             Self::GlassReflection(glass) => Some(Self::GlassTransmission(*glass)),
             Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
             Self::Phong(_)
-            | Self::Metal(_)
-            | Self::BrushedMetal(_)
+            | Self::Conductor(_)
+            | Self::BrushedConductor(_)
             | Self::Plastic(_)
             | Self::GlassTransmission(_)
             | Self::PrincipledTransmission(_) => None,
@@ -434,19 +435,19 @@ impl RoughBsdf {
 }
 
 impl BsdfRow {
-    /// A row of any content.
+    /// A packet with arbitrary contents.
     pub const EMPTY: Self = Self::Phong(PhongRow::EMPTY);
 
-    /// Samples a direction for each surface, on either of its sides, by the numbers of [`RoughRow::sample`]. `None` for kinds that
-    /// have no such samples.
+    /// Samples a direction for each surface, on either of its sides, with the random numbers of [`RoughRow::sample`]. `None` for
+    /// kinds without such samples.
     #[inline(always)]
     pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Option<SideSamples> {
         match self {
             Self::GlassReflection(row) => Some(row.call_sides(choices, u, simd)),
             Self::GlassTransmission(row) => Some(row.call_sides(choices, u, simd)),
             Self::Phong(_)
-            | Self::Metal(_)
-            | Self::BrushedMetal(_)
+            | Self::Conductor(_)
+            | Self::BrushedConductor(_)
             | Self::Plastic(_)
             | Self::Principled(_)
             | Self::PrincipledTransmission(_) => None,

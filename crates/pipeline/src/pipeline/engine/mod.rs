@@ -71,7 +71,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
 use crate::system::threads::{check_stack_space, start_failure};
-use crate::world::{Bodies, Coplanar, Lookups, World};
+use crate::world::{Coplanar, GlassSolids, TextureNeeds, World};
 
 /// Means of an engine; tests replace some of them.
 #[derive(Clone, Copy)]
@@ -95,7 +95,7 @@ pub(super) struct Engine {
     contents: Arc<Contents>,
     parsed: Memo<Arc<Parsed>>,
     meshes: Pool<MeshName, KeptMesh>,
-    bodies: Memo<Arc<Bodies>>,
+    bodies: Memo<Arc<GlassSolids>>,
     coplanar: Memo<Vec<Coplanar>>,
     textures: TextureCache,
     accel: AccelCache,
@@ -518,11 +518,11 @@ impl Engine {
     fn load(
         &mut self,
         parsed: &Parsed,
-        lookups: Lookups,
+        lookups: TextureNeeds,
         findings: &mut Findings,
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
-    ) -> Result<(Meshes, Arc<Bodies>, Textures, Needed), Stop> {
+    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, Needed), Stop> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
@@ -661,7 +661,7 @@ impl Engine {
             let reading = Reading { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
-            let mut wanted = needed(loaded, &found, Lookups::ALL, &self.textures);
+            let mut wanted = needed(loaded, &found, TextureNeeds::ALL, &self.textures);
             add_declared(loaded, &mut wanted.textures);
             wanted.are_required = true;
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;

@@ -22,7 +22,7 @@ use crate::pipeline::stages::{Staged, Stop};
 use crate::pipeline::watch::content::FileRead;
 use crate::scene::description::CameraChange;
 use crate::scene::fingerprint::{Fingerprint, Key};
-use crate::world::Lookups;
+use crate::world::TextureNeeds;
 
 /// The scene's own image, as the newest request found the scene.
 pub(super) struct OwnImage {
@@ -201,7 +201,7 @@ pub(super) fn own_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan
 }
 
 /// Textures that a request looks up. The keys of the films of both plans are made of them.
-pub(super) fn lookups(plan: &Plan, own: Option<&Plan>) -> Lookups {
+pub(super) fn lookups(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
     let shown = plan.settings.lookups();
     own.map_or(shown, |own| shown.or(own.settings.lookups()))
 }

@@ -14,7 +14,7 @@ use crate::pipeline::stages::textures::{Needed, Textures, needed, textures};
 use crate::pipeline::stages::{Findings, Reading, Stop};
 use crate::pipeline::table::StageTable;
 use crate::pipeline::watch::content::Snapshot;
-use crate::world::{Bodies, Lookups};
+use crate::world::{GlassSolids, TextureNeeds};
 
 /// A scene with all files that its picture needs.
 #[derive(Clone)]
@@ -23,7 +23,7 @@ pub(super) struct Good {
     pub(super) generation: u64,
     pub(super) parsed: Arc<Parsed>,
     pub(super) meshes: Meshes,
-    pub(super) bodies: Arc<Bodies>,
+    pub(super) bodies: Arc<GlassSolids>,
     pub(super) textures: Arc<Textures>,
     /// Purposes that the textures were loaded for.
     pub(super) needed: Needed,
@@ -80,7 +80,12 @@ impl Engine {
     }
 
     /// Loads what this picture looks up, where the scene was read for another one.
-    fn with_textures(&mut self, good: Good, lookups: Lookups, reading: &Reading<'_>) -> Result<Good, Stop> {
+    fn with_textures(
+        &mut self,
+        good: Good,
+        lookups: TextureNeeds,
+        reading: &Reading<'_>,
+    ) -> Result<Good, Stop> {
         let loaded = &good.parsed.loaded;
         let needed = needed(loaded, &good.meshes, lookups, &self.textures);
         let is_there = |one| good.needed.textures.contains(one);

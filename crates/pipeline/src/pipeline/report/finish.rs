@@ -88,7 +88,7 @@ fn lights(finished: &Finished<'_>) -> LightsReport {
     let settings = &finished.plan.settings;
     let samples = u64::from(settings.render.shadow_samples);
     let are_gathered = settings.gathers() && finished.photons.is_some_and(|photons| photons.emitted > 0);
-    let selection = lights.selection(receivers(settings, are_gathered));
+    let selection = lights.sampler(receivers(settings, are_gathered));
     let (sampled, picks) = match selection {
         Some(selection) => (LightsSampled::Picked, samples * u64::from(selection.picks.count)),
         None => (LightsSampled::All, 0),

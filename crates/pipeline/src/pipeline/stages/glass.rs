@@ -12,7 +12,7 @@ use crate::scene::Loaded;
 use crate::scene::description::Sheet;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
-use crate::world::{Bodies, OpenGlass};
+use crate::world::{GlassSolids, OpenGlass};
 
 /// Flaw of the picture where glass is open, under the place of the object.
 const LACKS: &str = "glass refracts where a ray goes in and where it comes out; no ray that comes through the hole \
@@ -25,10 +25,10 @@ const LACKS: &str = "glass refracts where a ray goes in and where it comes out; 
 pub(in crate::pipeline) fn glass(
     loaded: &Loaded,
     meshes: &Meshes,
-    memo: &mut Memo<Arc<Bodies>>,
+    memo: &mut Memo<Arc<GlassSolids>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<Arc<Bodies>, Stop> {
+) -> Result<Arc<GlassSolids>, Stop> {
     let scene = &loaded.scene;
     let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
     let key = keys::glass(scene, &keys::referents(scene, &mesh_keys, None));
@@ -36,7 +36,7 @@ pub(in crate::pipeline) fn glass(
         Arc::clone(bodies)
     } else {
         let files: Vec<&LoadedMesh> = meshes.iter().map(|mesh| &*mesh.mesh).collect();
-        Arc::new(Bodies::find(scene, &files, token)?)
+        Arc::new(GlassSolids::find(scene, &files, token)?)
     };
     memo.set(key, Arc::clone(&bodies));
     findings.warnings.extend(warnings_of_open(loaded, bodies.open()));

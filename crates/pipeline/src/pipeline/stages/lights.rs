@@ -7,14 +7,14 @@ use super::super::keys;
 use super::Staged;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
-use crate::lights::infinite::SkyMap;
-use crate::lights::{Lights, Receivers};
+use crate::lights::infinite::EnvironmentMap;
+use crate::lights::{Lights, SamplingMode};
 use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
 
 /// The distribution over the map of an environment, which stays while the file does, however it is turned.
-pub(in crate::pipeline) type SkyMemo = Memo<Option<Arc<SkyMap>>>;
+pub(in crate::pipeline) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
 
 /// Gather them.
 pub(in crate::pipeline) fn lights(
@@ -38,8 +38,8 @@ pub(in crate::pipeline) fn lights(
         0 => Staged::skipped(lights, "the scene has no light"),
         1 => Staged::done(lights, "1 light"),
         count => {
-            let are_picked = |receivers| lights.selection(receivers).is_some();
-            let picked = match (are_picked(Receivers::Eye), are_picked(Receivers::Paths)) {
+            let are_picked = |receivers| lights.sampler(receivers).is_some();
+            let picked = match (are_picked(SamplingMode::Eye), are_picked(SamplingMode::Paths)) {
                 (true, _) => picked("some are picked", &lights),
                 (false, true) => picked("paths pick some", &lights),
                 (false, false) => String::new(),
@@ -72,7 +72,7 @@ fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     })
 }
 
-fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<SkyMap>> {
+fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap>> {
     let Some((key, texels)) = &textures.environment else {
         *memo = SkyMemo::default();
         return None;

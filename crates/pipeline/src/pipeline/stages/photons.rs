@@ -29,7 +29,7 @@ const MOST_ALIVE_BYTES: usize = 256 << 20;
 /// Passes in use at once: looks into one at a time find more of it in the processor's caches.
 const MOST_ALIVE: u32 = 1;
 /// Samples at once where no photons are sent.
-const MOST_WITHOUT: u32 = 4096;
+const MAX_WITHOUT_TREE: u32 = 4096;
 
 /// Why no photons are sent.
 const NOTHING_THROWS_LIGHT: &str = "no mirror or glass throws light";
@@ -77,7 +77,7 @@ impl PhotonStore {
     /// Passes that may be in use at once, of the size of the first.
     pub(in crate::pipeline) fn at_once(&self) -> u32 {
         if !self.are_sent() {
-            return MOST_WITHOUT;
+            return MAX_WITHOUT_TREE;
         }
         let size = self.kept.borrow().first().map_or(1, |pass| pass.memory_bytes().max(1));
         ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)

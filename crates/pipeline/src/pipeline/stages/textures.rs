@@ -21,12 +21,12 @@ use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
-use crate::scene::description::{Channel, Encoding, PixelNumber, Scene, TextureRole};
+use crate::scene::description::{Channel, Encoding, PixelValue, Scene, TextureRole};
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, is_model};
 use crate::world::{
-    Cutoff, Image, Images, Lookups, NeededTexture, TextureSource, environment_source, textures_needed,
+    Cutoff, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source, textures_needed,
 };
 
 /// Most bytes that the texels of a scene's images may take together.
@@ -119,11 +119,11 @@ pub(in crate::pipeline) struct Needed {
 pub(in crate::pipeline) fn needed(
     loaded: &Loaded,
     meshes: &Meshes,
-    lookups: Lookups,
+    lookups: TextureNeeds,
     cache: &TextureCache,
 ) -> Needed {
     let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
-    let all = textures_needed(&loaded.scene, &meshes, Lookups::ALL);
+    let all = textures_needed(&loaded.scene, &meshes, TextureNeeds::ALL);
     let of_picture = textures_needed(&loaded.scene, &meshes, lookups);
     let left_out = all.len() - of_picture.len();
     if left_out == 0 || cache.has_all(&all) {
@@ -305,7 +305,7 @@ fn warn_of_unusable(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findin
 /// Says that a grey image has heights in place of normals. That of a mesh file bends nothing.
 fn warn_of_heights(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
     let normals = image.asked_by.iter().find_map(|one| Some((one, one.normals_of.as_deref()?)));
-    let Some((one, material)) = normals.filter(|_| texels.is_grey()) else { return };
+    let Some((one, material)) = normals.filter(|_| texels.is_gray()) else { return };
     let effect = match one.mesh_file {
         Some(_) => "it bends nothing (`bump` takes heights)",
         None => "it tilts everything to one side; `bump` takes heights",
@@ -317,7 +317,7 @@ fn warn_of_heights(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, finding
 
 /// Says that alpha by `channel = "a"` is 1 in all pixels.
 fn warn_of_full_alpha(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
-    const ALPHA: PixelNumber = PixelNumber::Channel(Channel::Alpha);
+    const ALPHA: PixelValue = PixelValue::Channel(Channel::Alpha);
     let is_alpha = |one: &&&NeededTexture| {
         matches!(one.source.encoding, ImageEncoding::Number { of: ALPHA, is_srgb: _ })
     };

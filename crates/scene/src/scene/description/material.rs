@@ -7,7 +7,7 @@ use super::Located;
 use crate::choice;
 pub use crate::materials::UvSet;
 pub use crate::materials::texture::{TextureFilter, Wrap};
-pub use crate::materials::{Channel, EmissionSides, PixelNumber};
+pub use crate::materials::{Channel, EmissionSides, PixelValue};
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// An image that materials look up.
@@ -82,12 +82,10 @@ impl NumberSource {
     }
 
     /// The texture and its number of each pixel, if it is one; without a channel, the number is `usual`.
-    pub fn texture(&self, usual: PixelNumber) -> Option<(usize, PixelNumber)> {
+    pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
         match *self {
             Self::Constant(_) => None,
-            Self::Texture { texture, channel } => {
-                Some((texture, channel.map_or(usual, PixelNumber::Channel)))
-            }
+            Self::Texture { texture, channel } => Some((texture, channel.map_or(usual, PixelValue::Channel))),
         }
     }
 }
@@ -114,8 +112,8 @@ impl OpacitySource {
     }
 
     /// The texture and its number of each pixel, if it has one.
-    pub fn texture(&self) -> Option<(usize, PixelNumber)> {
-        self.value.texture(PixelNumber::Opacity)
+    pub fn texture(&self) -> Option<(usize, PixelValue)> {
+        self.value.texture(PixelValue::Opacity)
     }
 }
 
@@ -277,8 +275,8 @@ pub struct Bump {
 
 impl Bump {
     /// The number of a pixel that is its height.
-    pub fn number(&self) -> PixelNumber {
-        self.channel.map_or(PixelNumber::Luminance, PixelNumber::Channel)
+    pub fn number(&self) -> PixelValue {
+        self.channel.map_or(PixelValue::Luminance, PixelValue::Channel)
     }
 }
 
@@ -292,7 +290,7 @@ pub enum TextureUse {
     /// Normals.
     Normal,
     /// Numbers.
-    Number(PixelNumber),
+    Number(PixelValue),
 }
 
 /// Role of a texture in a material.
@@ -307,17 +305,17 @@ pub enum TextureRole {
     /// Reflectance of microfacets, by normal incidence or by the index of refraction.
     Facets,
     /// Roughness, and other numbers of microfacets.
-    Roughness(PixelNumber),
+    Roughness(PixelValue),
     /// Radiance.
     Emission,
     /// Map that bends its normals.
     NormalMap,
     /// Heights that bend its normals.
-    Bump(PixelNumber),
+    Bump(PixelValue),
     /// The chance that it is there.
-    Opacity(PixelNumber),
+    Opacity(PixelValue),
     /// Clear coat over what emits.
-    EmissionCoat(PixelNumber),
+    EmissionCoat(PixelValue),
 }
 
 impl TextureRole {
@@ -500,14 +498,14 @@ impl Material {
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
         let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
-        let numbers = kind.numbers().into_iter().filter_map(|number| number.texture(PixelNumber::Luminance));
+        let numbers = kind.numbers().into_iter().filter_map(|number| number.texture(PixelValue::Luminance));
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
         let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.number())));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
         let coat = self.emission_coat().into_iter().flatten();
-        let coat = coat.filter_map(|number| number.texture(PixelNumber::Luminance));
+        let coat = coat.filter_map(|number| number.texture(PixelValue::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
         colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()
     }

@@ -17,7 +17,7 @@ pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{Environment, Light};
 pub use material::{
     Bump, Channel, ColorSource, EmissionSides, EmissionSource, Encoding, FresnelSource, Material,
-    MaterialKind, NormalMap, NumberSource, OpacitySource, PixelNumber, Texture, TextureFilter, TextureRole,
+    MaterialKind, NormalMap, NumberSource, OpacitySource, PixelValue, Texture, TextureFilter, TextureRole,
     TextureUse, UvSet, Wrap,
 };
 pub use method::{Integrator, Method};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::super::description::{
-    Channel, Encoding, Located, Material, PixelNumber, Texture, TextureFilter, TextureUse, UvSet, Wrap,
+    Channel, Encoding, Located, Material, PixelValue, Texture, TextureFilter, TextureUse, UvSet, Wrap,
 };
 use super::super::keys::endings::{GLTF, MAPS};
 use super::super::sanitize::shortened;
@@ -62,7 +62,7 @@ pub(super) fn check_encodings(context: &Context<'_>, textures: &Textures, materi
     for (texture, role) in materials.iter().flat_map(Material::textures) {
         match role.texture_use() {
             TextureUse::Color | TextureUse::CutOut => colors[texture] = true,
-            TextureUse::Normal | TextureUse::Number(PixelNumber::Channel(Channel::Alpha)) => {}
+            TextureUse::Normal | TextureUse::Number(PixelValue::Channel(Channel::Alpha)) => {}
             TextureUse::Number(_) => numbers[texture] = true,
         }
     }

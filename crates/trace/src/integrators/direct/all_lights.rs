@@ -7,7 +7,7 @@ use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow};
+use crate::lights::{EmissionTexture, Light, LightCenter, LightObject, LightObjectPacket, LightSamplePacket};
 use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
@@ -111,7 +111,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let takes = |light: &Light| !self.only_infinite || light.is_beyond();
         let mut sampler = None;
         for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| takes(light)) {
-            if MIS && self.tile.paths_find_sky && light.is_from_all_around() {
+            if MIS && self.tile.paths_find_sky && light.is_environment() {
                 continue;
             }
             // If a single shadow ray decides for the whole light, defer the sum until it is traced.
@@ -143,12 +143,12 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 }
                 // Apply the MIS weight, unless the light has no extent and only light samples find it.
                 if MIS && !is_single {
-                    let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
+                    let leaves_gloss = self.tile.lobes_find_sky && light.is_environment();
                     let of_light = if leaves_gloss && self.competing.are_lobes() {
                         // Pretend a vanishing light-sampling pdf, so that lobe rays account for all of the light.
                         [f32::MAX; PACKET_SIZE]
                     } else {
-                        light.inverse_densities(&samples)
+                        light.inverse_pdfs(&samples)
                     };
                     let competing = self.competing.rays_per_sample(count);
                     values = self.competing.weighted(
@@ -174,7 +174,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn attenuate_by_glass(
         &self,
         interior_lists: &InteriorLists,
-        samples: &LightRow,
+        samples: &LightSamplePacket,
         mut values: Vec3x16,
     ) -> Vec3x16 {
         for i in lanes(self.used) {
@@ -194,7 +194,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn textured(
         &self,
         pattern: &EmissionTexture,
-        samples: &LightRow,
+        samples: &LightSamplePacket,
         active: u32,
         mut values: Vec3x16,
     ) -> Vec3x16 {
@@ -217,7 +217,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn add(
         &self,
-        samples: &LightRow,
+        samples: &LightSamplePacket,
         values: &Vec3x16,
         active: u32,
         sums: &mut LightSums,
@@ -245,7 +245,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn add_pending(
         &self,
-        middle: Option<(Middle, Source)>,
+        middle: Option<(LightCenter, LightObject)>,
         pending: &PendingLight,
         sums: &mut LightSums,
         simd: impl Simd,
@@ -263,8 +263,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in 0..PACKET_SIZE {
             let from = lane(&self.row.from, i);
             let ray = match middle {
-                Middle::At(middle) => Ray::segment(from, middle),
-                Middle::Towards(direction) => Ray::new(from, direction),
+                LightCenter::At(middle) => Ray::segment(from, middle),
+                LightCenter::Towards(direction) => Ray::new(from, direction),
             };
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
@@ -274,7 +274,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayPacket::of(self.row.from, direction).leaving(self.row.starts(&direction));
-        self.add_unoccluded((&rays, &ends, traced), &SourceRow::of(source), &pending.light, sums, simd);
+        self.add_unoccluded(
+            (&rays, &ends, traced),
+            &LightObjectPacket::of(source),
+            &pending.light,
+            sums,
+            simd,
+        );
     }
 
     /// Traces the shadow rays in `traced` and adds the light of those that are unoccluded; other rays have a `t_max`
@@ -283,7 +289,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     pub fn add_unoccluded(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &SourceRow,
+        sources: &LightObjectPacket,
         values: &Vec3x16,
         sums: &mut LightSums,
         simd: impl Simd,
@@ -292,7 +298,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if self.aov == LightAov::TraversalCost {
             return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
-        if self.tile.world.has_passable() {
+        if self.tile.world.has_see_through() {
             return self.add_attenuated((rays, ends, traced), sources, values, sums);
         }
         let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, simd);
@@ -305,11 +311,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn add_attenuated(
         &self,
         (rays, ends, traced): (&RayPacket, &F32x16, u32),
-        sources: &SourceRow,
+        sources: &LightObjectPacket,
         values: &Vec3x16,
         sums: &mut LightSums,
     ) {
-        let weakened = self.tile.world.weakened_rows(rays, ends, traced, sources);
+        let weakened = self.tile.world.transmittance_packet(rays, ends, traced, sources);
         sums.rays.lookups += weakened.lookups;
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
@@ -322,7 +328,12 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// The unoccluded contribution of each sample, the mask of nonzero ones, and the response of its vertex.
     #[inline(always)]
-    pub fn contributions(&self, samples: &LightRow, share: f32, simd: impl Simd) -> (Vec3x16, u32, Response) {
+    pub fn contributions(
+        &self,
+        samples: &LightSamplePacket,
+        share: f32,
+        simd: impl Simd,
+    ) -> (Vec3x16, u32, Response) {
         let response = self.row.response(&samples.directions, simd);
         let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
@@ -347,7 +358,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// The shadow rays to the samples in `active`; in other lanes, `t_max` is below 0.
     #[inline(always)]
-    pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayPacket, F32x16) {
+    pub fn shadow_rays(&self, samples: &LightSamplePacket, active: u32) -> (RayPacket, F32x16) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
@@ -373,7 +384,7 @@ pub fn add_traversal_cost(
     sums: &mut Vec3x16,
 ) {
     for i in lanes(traced) {
-        let work = tile.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
+        let work = tile.world.geometry.traversal_cost(&Ray { t_max: ends[i], ..rays.ray(i) });
         let sum = lane(sums, i) + Vec3::splat(work as f32);
         set_lane(sums, i, sum);
     }

@@ -6,7 +6,10 @@ use super::all_lights::{LightSums, SampleAllLights, add_where};
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::packet::lanes;
 use crate::integrators::view::LightAov;
-use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
+use crate::lights::{
+    LightCenter, LightSamplePacket, LightSampler, LightSamplingEffort, LightTree, Receiver, ReceiverLobe,
+    ReceiverPacket,
+};
 use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, lane, set_lane};
@@ -17,7 +20,7 @@ use crate::world::SimdKernel;
 /// Samples lights picked from a tree at a packet of vertices.
 pub struct SampleLightTree<'a, const MIS: bool> {
     pub lighting: SampleAllLights<'a, MIS>,
-    pub selection: Selection<'a>,
+    pub selection: LightSampler<'a>,
     /// Index of the packet, under which its shadow rays are queued in the pool.
     pub number: u32,
     pub pool: &'a mut ShadowRayQueue,
@@ -113,7 +116,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     fn picks(
         &self,
-        Selection { tree, picks: way, .. }: Selection<'_>,
+        LightSampler { tree, picks: way, .. }: LightSampler<'_>,
         sampler: &SamplerPacket<PACKET_SIZE>,
         samples: Range<u32>,
     ) -> Vec<LightPicks> {
@@ -140,7 +143,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         }
         // Pick lights with these numbers.
         let mut picks = vec![LightPicks::EMPTY; numbers.len()];
-        if tree.is_flat() {
+        if tree.is_single_node() {
             self.pick_flat(tree, &numbers, &mut picks);
         } else {
             self.pick_by_cuts(tree, way, &numbers, &mut picks);
@@ -156,7 +159,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; PACKET_SIZE]], picks: &mut [LightPicks]) {
         let row = self.row;
         // Estimate the light from each source at each vertex, with and without glossy lobes.
-        let plain = ReceiverRow::plain(&row.from, &row.normal);
+        let plain = ReceiverPacket::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.lobe(i) {
@@ -164,8 +167,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
         }
         // Normalize the estimates.
-        let Some(shares) = tree.flat_shares(&glossy, row.bsdf.has_narrow_lobes()) else { return };
-        let without = (MIS && row.bsdf.has_narrow_lobes()).then(|| tree.flat_shares(&plain, false)).flatten();
+        let Some(shares) = tree.single_node_importance(&glossy, row.bsdf.has_narrow_lobes()) else { return };
+        let without = (MIS && row.bsdf.has_narrow_lobes())
+            .then(|| tree.single_node_importance(&plain, false))
+            .flatten();
         // Pick with each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
             let picked = shares.pick(numbers);
@@ -187,7 +192,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn pick_by_cuts(
         &self,
         tree: &LightTree,
-        way: Picks,
+        way: LightSamplingEffort,
         numbers: &[[f64; PACKET_SIZE]],
         picks: &mut [LightPicks],
     ) {
@@ -196,9 +201,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         for i in lanes(self.used) {
             let plain = Receiver::plain(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.lobe(i);
-            cut.go_to(&Receiver { lobe, ..plain });
+            cut.move_to(&Receiver { lobe, ..plain });
             let without = without.as_mut().filter(|_| lobe.is_some()).map(|without| {
-                without.go_to(&plain);
+                without.move_to(&plain);
                 &*without
             });
             for (numbers, picks) in numbers.chunks(group).zip(picks.chunks_mut(group)) {
@@ -216,10 +221,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// The narrow lobe of a vertex, relative to its wide lobes.
     #[inline(always)]
-    fn lobe(&self, i: usize) -> Option<Lobe> {
+    fn lobe(&self, i: usize) -> Option<ReceiverLobe> {
         let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
         let is_both = wide > 0.0;
-        Some(Lobe {
+        Some(ReceiverLobe {
             axis,
             shininess: exponent,
             peak: if is_both { peak / wide } else { 1.0 },
@@ -243,7 +248,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Sample a point on each picked light.
         let u = sampler.pairs(&row.path, Dimension::ChosenLight, number, count);
         let at = (&row.from, &row.normal);
-        let (mut samples, mut inverse, lookups) = self.tile.world.lights.sample_each(&lights, at, used, &u);
+        let (mut samples, mut inverse, lookups) =
+            self.tile.world.lights.sample_per_lane(&lights, at, used, &u);
         sums.rays.lookups += lookups;
         for i in 0..PACKET_SIZE {
             let weight = lane(&samples.weights, i) * pick.shares[i];
@@ -281,7 +287,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 sums.rays.shadow += u64::from(traced.count_ones());
                 let mut places = [0; PACKET_SIZE];
                 for i in 0..PACKET_SIZE {
-                    places[i] = tree.place_of(lights[i]);
+                    places[i] = tree.position_of(lights[i]);
                 }
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
@@ -292,15 +298,15 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     }
 
     /// Aims rays at the centers of lights that have one.
-    fn aim_at_centers(&self, samples: &mut LightRow, lights: &[u32; PACKET_SIZE], active: u32) {
+    fn aim_at_centers(&self, samples: &mut LightSamplePacket, lights: &[u32; PACKET_SIZE], active: u32) {
         for i in lanes(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };
             let direction = match middle {
-                Middle::At(middle) => {
+                LightCenter::At(middle) => {
                     set_lane(&mut samples.targets, i, middle);
                     (middle - lane(&self.row.from, i)).try_normalize().unwrap_or(Vec3::ZERO)
                 }
-                Middle::Towards(direction) => direction,
+                LightCenter::Towards(direction) => direction,
             };
             set_lane(&mut samples.directions, i, direction);
             samples.sources.set(i, source);

@@ -88,7 +88,7 @@ impl SimdKernel for LobeRays<'_> {
                 let pdf = pdfs[i];
                 let lookups = &mut arrived.rays.lookups;
                 let radiance = match hits.get(i) {
-                    hit if tile.world.has_passable() => {
+                    hit if tile.world.has_see_through() => {
                         let hit = hit.map(|shape| Hit { shape, object: objects[i] });
                         let (ray, normal) = (rays.ray(i), lane(&row.normal, i));
                         let left = |distance| transmittance(i, distance);

@@ -5,12 +5,12 @@ use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{LightHit, LightRow, Side, Source};
+use crate::lights::{LightHit, LightObject, LightSamplePacket, Side};
 use crate::materials::Footprint;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
-use crate::world::{Hit, MOST_STRAIGHT};
+use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 
 /// The technique that competes with light samples.
 #[derive(Clone, Copy)]
@@ -56,7 +56,7 @@ impl CompetingTechnique {
     pub fn weighted(
         self,
         row: &VertexBatch,
-        (samples, response): (&LightRow, &Response),
+        (samples, response): (&LightSamplePacket, &Response),
         mut values: Vec3x16,
         (of_light, competing): (&F32x16, f32),
         simd: impl Simd,
@@ -138,7 +138,7 @@ impl TileContext<'_> {
         let (lights, pdf) = (&self.world.lights, path.state.pdf);
         let samples = self.settings.render.shadow_samples as f32;
         if pdf.is_nan() || pdf <= 0.0 {
-            return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
+            return lights.radiance_from_infinity_with(sky, path.ray.direction, |_, _| 1.0);
         }
         // If light samples skip the environment, its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.paths_find_sky { 0.0 } else { of_sky }));
@@ -169,11 +169,11 @@ impl TileContext<'_> {
         share: impl Fn(f32) -> f32,
     ) -> Vec3 {
         let lights = &self.world.lights;
-        if !lights.are_beyond() {
+        if !lights.has_infinite_lights() {
             return Vec3::ZERO;
         }
         let samples = lights.samples_at(self.behavior.receivers, ray.origin, normal);
-        lights.beyond_with(sky, ray.direction, |number, pdf| {
+        lights.radiance_from_infinity_with(sky, ray.direction, |number, pdf| {
             if only.is_none_or(|only| only == number) { share(pdf * samples.of(number)) } else { 0.0 }
         })
     }
@@ -185,7 +185,7 @@ impl TileContext<'_> {
         let met = LightHit { direction, distance, normal: of_light, primitive };
         let lights = &self.world.lights;
         let side = if of_light.dot(direction) > 0.0 { Side::Back } else { Side::Front };
-        lights.of_hit(hit.object, primitive, side).map_or(0.0, |(number, light)| {
+        lights.light_at(hit.object, primitive, side).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)
                 * lights.samples_at(self.behavior.receivers, ray.origin, normal).of(number)
         })
@@ -204,12 +204,12 @@ impl TileContext<'_> {
         let world = self.world;
         let material = &world.materials[world.material_index(hit)];
         let emission = &material.emission;
-        if !emission.shines() {
+        if !emission.is_emissive() {
             return Vec3::ZERO;
         }
         let surface = world.geometry.surface(ray, hit);
         let normal = surface.normal;
-        if !emission.shines_from(normal.dot(ray.direction) < 0.0) {
+        if !emission.emits_from(normal.dot(ray.direction) < 0.0) {
             return Vec3::ZERO;
         }
         let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
@@ -234,7 +234,7 @@ impl TileContext<'_> {
     ) -> Vec3 {
         let (mut sum, mut left, mut passed) = (Vec3::ZERO, Vec3::ONE, 0.0);
         let (mut along, mut next) = (*ray, first);
-        for _ in 0..=MOST_STRAIGHT {
+        for _ in 0..=MAX_NULL_INTERACTIONS {
             let Some(hit) = next else {
                 let beyond = self.infinite_radiance(ray, from_normal, pdf);
                 return sum + left * beyond * transmittance(f32::MAX);
@@ -245,7 +245,7 @@ impl TileContext<'_> {
             let radiance = self.emitter_radiance(ray, from_normal, &met, pdf, lookups);
             sum += left * radiance * transmittance(distance);
             // Continue if the surface may be a null interaction.
-            if !self.world.materials[self.world.material_index(&hit)].lets_pass() {
+            if !self.world.materials[self.world.material_index(&hit)].has_null_interaction() {
                 return sum;
             }
             let (part, beyond) = self.world.beyond(&along, &hit, lookups);
@@ -263,7 +263,7 @@ impl TileContext<'_> {
     pub fn touching_emitter_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
-        if path.state.pdf > 0.0 && !self.world.is_dark(&shadow, Source::Object(hit.object)) {
+        if path.state.pdf > 0.0 && !self.world.is_dark(&shadow, LightObject::Object(hit.object)) {
             self.emitter_weight(path, hit)
         } else {
             1.0

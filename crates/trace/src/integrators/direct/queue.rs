@@ -19,7 +19,7 @@ use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{LightAov, PathClasses};
-use crate::lights::{Source, SourceRow};
+use crate::lights::{LightObject, LightObjectPacket};
 use crate::materials::RoughKind;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
@@ -207,7 +207,7 @@ impl DirectLightQueue {
     ) -> Result<LightRayCounts, Cancelled> {
         let mut rays = LightRayCounts::default();
         let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
-        let together = if tile.world.lights.selection(tile.behavior.receivers).is_some() { ROWS } else { 1 };
+        let together = if tile.world.lights.sampler(tile.behavior.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows come only from light samples.
         let shares_with_paths = continuation.is_some()
             && (!tile.behavior.gathers || tile.settings.render.shadows == Shadows::Soft);
@@ -319,7 +319,7 @@ impl DirectLightQueue {
         let weighed =
             SampleAllLights::<true> { tile, row, used, aov, competing, interior_lists, only_infinite: false };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.selection(tile.behavior.receivers)) {
+        let sums = match (competing, tile.world.lights.sampler(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
                 instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })
@@ -425,7 +425,7 @@ impl SimdKernel for LiftOrigins<'_> {
         let rays = RayPacket::of(row.from, direction).leaving(row.start);
         // Find the occluded rays.
         let blocked = {
-            let (traced, nothing) = (traced(&ends, simd), SourceRow::of(Source::Nothing));
+            let (traced, nothing) = (traced(&ends, simd), LightObjectPacket::of(LightObject::Nothing));
             geometry.occluded_rows(&rays, &ends, traced, &nothing, simd)
         };
         // Move the other origins.

@@ -5,7 +5,7 @@ use super::all_lights::{LightSums, add_where, transmitted};
 use crate::geometry::packet::{F32x16, RayPacket, lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
-use crate::lights::{Source, SourceRow};
+use crate::lights::{LightObject, LightObjectPacket};
 use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{SimdKernel, World};
 
@@ -17,7 +17,7 @@ struct QueuedShadowRays {
     ends: F32x16,
     /// Mask of rays to trace.
     traced: u32,
-    sources: SourceRow,
+    sources: LightObjectPacket,
     values: Vec3x16,
 }
 
@@ -50,7 +50,7 @@ impl ShadowRayQueue {
         &mut self,
         row: u32,
         (rays, ends, traced): (RayPacket, F32x16, u32),
-        sources: &SourceRow,
+        sources: &LightObjectPacket,
         values: &Vec3x16,
         places: &[u32; PACKET_SIZE],
     ) {
@@ -127,7 +127,7 @@ impl SimdKernel for TraceShadowRays<'_> {
         for rays in rays.chunks(PACKET_SIZE) {
             let mut packet = RayPacket::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
             let mut ends = [-1.0; PACKET_SIZE];
-            let mut sources = SourceRow::of(Source::Nothing);
+            let mut sources = LightObjectPacket::of(LightObject::Nothing);
             for (to, &ray) in rays.iter().enumerate() {
                 let (row, from) = (&rows[ray as usize / PACKET_SIZE], ray as usize % PACKET_SIZE);
                 for axis in 0..3 {
@@ -139,7 +139,7 @@ impl SimdKernel for TraceShadowRays<'_> {
                 sources.copy(to, &row.sources, from);
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
-            let occluded = if world.has_passable() {
+            let occluded = if world.has_see_through() {
                 attenuate(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
                 world.geometry.occluded_rows(&packet, &ends, traced, &sources, simd)
@@ -160,10 +160,10 @@ fn attenuate(
     world: &World,
     aov: LightAov,
     (packet, ends, traced): (&RayPacket, &F32x16, u32),
-    sources: &SourceRow,
+    sources: &LightObjectPacket,
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
-    let weakened = world.weakened_rows(packet, ends, traced, sources);
+    let weakened = world.transmittance_packet(packet, ends, traced, sources);
     for from in lanes(traced & !weakened.occluded) {
         let left = transmitted(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);

@@ -4,11 +4,11 @@
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{Light, Middle, Side, Source};
+use crate::lights::{Light, LightCenter, LightObject, Side};
 use crate::math::Vec3;
 use crate::math::lanes::lane;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, MOST_STRAIGHT};
+use crate::world::{Hit, MAX_NULL_INTERACTIONS};
 
 use super::all_lights::LightRayCounts;
 
@@ -32,7 +32,7 @@ impl UnshadowedLobeRay<'_> {
         let (world, normal) = (tile.world, lane(&row.normal, *i));
         let (mut sum, mut along, mut passed) = (Vec3::ZERO, *ray, 0.0);
         // Add the emitters along the ray, front to back.
-        for _ in 0..=MOST_STRAIGHT {
+        for _ in 0..=MAX_NULL_INTERACTIONS {
             let Some(hit) = world.geometry.closest_of(&along, |object| world.lights.has_object(object))
             else {
                 break;
@@ -43,7 +43,7 @@ impl UnshadowedLobeRay<'_> {
             if radiance != Vec3::ZERO {
                 let front = world.geometry.surface(ray, &met).normal;
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
-                let light = world.lights.of_hit(hit.object, hit.shape.primitive, side);
+                let light = world.lights.light_at(hit.object, hit.shape.primitive, side);
                 let arriving = light.map_or(Vec3::ZERO, |(_, light)| self.arriving(light, rays));
                 sum += radiance * transmittance(distance) * arriving;
             }
@@ -67,15 +67,15 @@ impl UnshadowedLobeRay<'_> {
         }
         // An environment has no center: the ray itself decides.
         let (segment, source) = match light.middle() {
-            Some((Middle::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
-            Some((Middle::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
-            None => (self.ray, Source::Nothing),
+            Some((LightCenter::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
+            Some((LightCenter::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
+            None => (self.ray, LightObject::Nothing),
         };
         if self.row.is_below_horizon(self.lane, segment.direction) {
             return Vec3::ZERO;
         }
         rays.shadow += 1;
         let segment = segment.leaving(self.row.start_of(self.lane, segment.direction));
-        self.tile.world.left_on_segment(&segment, source, &mut rays.lookups)
+        self.tile.world.transmittance(&segment, source, &mut rays.lookups)
     }
 }

@@ -55,7 +55,7 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     let mut around = KernelNeighborhood::new(look, radius);
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
-    let is_exact = world.geometry.around(&bounds, |id, object| match object {
+    let is_exact = world.geometry.visit_box(&bounds, |id, object| match object {
         Object::Shape(shape) => around.add_shape(shape, || receives(material(world, id, 0))),
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
@@ -186,7 +186,7 @@ impl KernelNeighborhood {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
         // Trees visit some triangles twice, and others that are only close. Skip both, or the result would depend on
         // the tree.
-        let is_exact = mesh.around(bounds, |triangle| {
+        let is_exact = mesh.visit_box(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known
                 || !Aabb::around_f64(mesh.world_corners(triangle)).meets(bounds)

@@ -27,13 +27,13 @@ use crate::integrators::transport::walk::{
 };
 use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET_SIZE, RayCounters};
-use crate::lights::{Emitted, Numbers, PhotonSource, Start};
+use crate::lights::{EmittedPhoton, PhotonNumbers, PhotonOrigin, PhotonSource};
 use crate::materials::bsdf::LobeSet;
-use crate::materials::{Bsdf, Coated, Pane, Rough, RoughBsdf};
+use crate::materials::{Bsdf, Coated, Rough, RoughBsdf, ThinDielectric};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
-use crate::world::{BodyInParts, Hit, SimdKernel, World};
+use crate::world::{CompoundSolid, Hit, SimdKernel, World};
 
 /// Squared difference below which directions are equal within rounding.
 const SAME: f32 = 1e-8;
@@ -47,7 +47,7 @@ pub struct PhotonTracing<'a> {
     /// The closed glass shapes that may contain lights, with their materials.
     pub glasses: &'a [Interior],
     /// Other glass solids that may contain lights.
-    pub bodies: &'a [BodyInParts],
+    pub bodies: &'a [CompoundSolid],
     /// Reciprocal of the number of photons.
     pub share: f32,
     /// Maximum number of bounces of a photon.
@@ -116,7 +116,7 @@ impl PhotonTracing<'_> {
                 return Some(Ray::new(start, ray.direction));
             };
             let material = &world.materials[world.material_index(&hit)];
-            if material.bsdf.glass().is_none() && !material.lets_pass() {
+            if material.bsdf.glass().is_none() && !material.has_null_interaction() {
                 return None;
             }
             let SurfacePoint { point, error, normal, .. } = world.geometry.surface(&back, &hit);
@@ -126,7 +126,7 @@ impl PhotonTracing<'_> {
     }
 
     /// The medium at the start of a photon.
-    fn interiors_at(&self, point: Vec3, emitted: &Emitted) -> InteriorList {
+    fn interiors_at(&self, point: Vec3, emitted: &EmittedPhoton) -> InteriorList {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
         let around = |glass: &&Interior| world.encloses(glass.body, point);
@@ -201,7 +201,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         path: &PathRay,
         vertex: &Vertex<'a>,
         _: OpaqueHit,
-        pane: &Pane,
+        pane: &ThinDielectric,
     ) -> NullInteraction {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
         let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
@@ -307,7 +307,7 @@ impl PhotonWavefront<'_> {
                 let ray = reflected(path, vertex, &shading, reflectance);
                 self.push(path, vertex, (shading.normal, 1.0), ray);
             }
-            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => {}
+            Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {}
         }
     }
 
@@ -509,10 +509,10 @@ fn flux(world: &World, path: &PathRay) -> f32 {
     path.throughput.max_element() * index * index
 }
 
-fn is_beyond(emitted: &Emitted) -> bool {
+fn is_beyond(emitted: &EmittedPhoton) -> bool {
     match emitted.start {
-        Start::Beyond(_) => true,
-        Start::Point(_) | Start::Surface { .. } => false,
+        PhotonOrigin::Beyond(_) => true,
+        PhotonOrigin::Point(_) | PhotonOrigin::Surface { .. } => false,
     }
 }
 
@@ -523,7 +523,7 @@ struct EmissionNumbers<'a> {
 }
 
 impl SimdKernel for EmissionNumbers<'_> {
-    type Output = [Numbers; PACKET_SIZE];
+    type Output = [PhotonNumbers; PACKET_SIZE];
 
     #[inline(always)]
     fn run(self, _: impl Simd) -> Self::Output {
@@ -533,7 +533,7 @@ impl SimdKernel for EmissionNumbers<'_> {
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
         let (light, aim) = (pairs(Dimension::PhotonLight), pairs(Dimension::PhotonTarget));
         let (position, direction) = (pairs(Dimension::PhotonPosition), pairs(Dimension::PhotonDirection));
-        std::array::from_fn(|i| Numbers {
+        std::array::from_fn(|i| PhotonNumbers {
             light: light.map(|row| row[i]),
             aim: aim.map(|row| row[i]),
             position: position.map(|row| row[i]),

@@ -124,7 +124,7 @@ fn kernel_sum(
         return (Vec3::splat(map.count_near(look, simd) as f32), None);
     }
     let is_flat = row.has_facet & 1 << i == 0;
-    match row.bsdf.even(i).filter(|_| is_flat) {
+    match row.bsdf.constant_f(i).filter(|_| is_flat) {
         Some(f) => {
             let (irradiance, photon) = map.irradiance(look, random, simd);
             (f * irradiance, photon)

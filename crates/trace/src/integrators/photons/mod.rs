@@ -53,10 +53,10 @@ use crate::integrators::behavior::PathBehavior;
 use crate::integrators::settings::{PhotonSettings, RenderSettings};
 use crate::integrators::transport::interiors::Interior;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
-use crate::lights::{Ball, PhotonSource};
-use crate::materials::{Glass, Material};
+use crate::lights::{BoundingSphere, PhotonSource};
+use crate::materials::{Dielectric, Material};
 use crate::scene::description::{Render, Shadows};
-use crate::world::{BodyInParts, Hit, LampBox, World, photon_source};
+use crate::world::{CompoundSolid, Hit, LightBox, World, photon_source};
 use emit::{PhotonChunk, PhotonTracing};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -84,7 +84,7 @@ pub struct Photons {
     /// The closed glass shapes that may contain lights.
     glasses: Vec<u32>,
     /// The other glass solids that may contain lights.
-    bodies: Vec<BodyInParts>,
+    bodies: Vec<CompoundSolid>,
     /// Kernel radii of the first pass, for caustic and for bounced photons.
     radii: [f32; 2],
 }
@@ -345,8 +345,8 @@ fn radius_for_count(
 }
 
 /// The closed glass shapes that may contain lights, and the other glass solids that may.
-fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
-    let lamps = world.lamp_boxes();
+fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<CompoundSolid>) {
+    let lamps = world.light_boxes();
     let may_hold_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
         bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.meets(&bounds)))
@@ -354,10 +354,10 @@ fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
     let closed = world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect();
     // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of each
     // light.
-    let is_around = |body: &BodyInParts, lamp: &LampBox| {
+    let is_around = |body: &CompoundSolid, lamp: &LightBox| {
         lamp.points().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
-    let mut bodies = world.bodies_in_parts();
+    let mut bodies = world.compound_solids();
     bodies.retain(|body| {
         lamps.iter().any(|lamp| lamp.meets(&body.bounds) || body.is_covered && is_around(body, lamp))
     });
@@ -394,7 +394,7 @@ const NEAR: f32 = 1e-3;
 /// The mirrors and glass objects of a scene.
 struct SpecularObjects {
     /// Bounding spheres of the bounded objects.
-    balls: Vec<Ball>,
+    balls: Vec<BoundingSphere>,
     /// Whether there are unbounded objects.
     is_unbounded: bool,
 }
@@ -406,12 +406,12 @@ impl SpecularObjects {
         for (id, object) in (0..).zip(world.geometry.objects()) {
             // Between equal indices, light passes rough glass undisturbed, but light samples cannot.
             let is_specular = |material: &Material| {
-                let is_passed = |glass: &Glass| glasses.may_vanish(id, glass.ior);
+                let is_passed = |glass: &Dielectric| glasses.may_vanish(id, glass.ior);
                 material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
             };
             if world.materials_of(id).any(is_specular) {
-                own.balls.extend(object.ball());
-                own.is_unbounded |= object.ball().is_none();
+                own.balls.extend(object.bounding_sphere());
+                own.is_unbounded |= object.bounding_sphere().is_none();
             }
         }
         own

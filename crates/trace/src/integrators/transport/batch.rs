@@ -90,11 +90,12 @@ impl VertexBatch {
             LightAov::TraversalCost => true,
         };
         let is_soft = tile.settings.render.shadows == Shadows::Soft;
-        if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_found()) {
+        if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_hit()) {
             return 0;
         }
         // The solid angle of a lobe is about 2π/(α + 1) sr.
-        let filled = Self::MIN_WIDTH_RATIO * std::f32::consts::TAU / tile.world.lights.extent_beyond() - 1.0;
+        let filled =
+            Self::MIN_WIDTH_RATIO * std::f32::consts::TAU / tile.world.lights.infinite_solid_angle() - 1.0;
         let least = filled.min(Self::MIN_SHARP_EXPONENT);
         self.bsdf.narrower_than(self.used, least)
     }

@@ -62,7 +62,7 @@ impl TileContext<'_> {
     /// The path that begins with a camera ray.
     #[inline(always)]
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
-        let interiors = if self.world.is_eye_in_air() {
+        let interiors = if self.world.is_camera_in_air() {
             InteriorList::default()
         } else {
             self.camera_interiors(ray.origin)
@@ -113,7 +113,7 @@ impl TileContext<'_> {
             }
         } else {
             for lane in 0..PACKET_SIZE {
-                let ray = camera.middle_ray(DVec2::new(places[0][lane], places[1][lane]));
+                let ray = camera.pinhole_ray(DVec2::new(places[0][lane], places[1][lane]));
                 set_lane(&mut origin, lane, ray.origin);
                 set_lane(&mut direction, lane, ray.direction);
             }

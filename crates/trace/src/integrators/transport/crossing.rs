@@ -5,12 +5,12 @@ use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
-use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
+use crate::world::{CoincidentSurface, ContactQuery, ContactScratch, Hit, OffsetPoints};
 
 /// The surfaces and media that a ray crosses at a hit on glass.
 pub struct Crossing {
     /// Origins for rays that leave on either side.
-    pub sides: Sides,
+    pub sides: OffsetPoints,
     /// The medium that the ray traveled through, and the medium on the near side. `None` if both are the ray's recorded
     /// medium.
     pub before: Option<[InteriorList; 2]>,
@@ -33,8 +33,8 @@ pub struct Boundary {
 /// Buffers for the search for coincident surfaces.
 #[derive(Default)]
 pub struct CrossingMemory {
-    around: NearMemory,
-    near: Vec<Near>,
+    around: ContactScratch,
+    near: Vec<CoincidentSurface>,
 }
 
 impl TileContext<'_> {
@@ -49,7 +49,7 @@ impl TileContext<'_> {
         let CrossingMemory { around, near: found } = memory;
         found.clear();
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
-        let meeting = Meeting { hit, surface: &vertex.surface, normal: vertex.normal, lead };
+        let meeting = ContactQuery { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.contact(&meeting, around, |near| found.push(near));
         let (before, far) = self.crossing_interiors(&path.interiors, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
@@ -65,18 +65,18 @@ impl TileContext<'_> {
     fn crossing_interiors(
         &self,
         known: &InteriorList,
-        found: &[Near],
+        found: &[CoincidentSurface],
     ) -> (Option<[InteriorList; 2]>, InteriorList) {
         let is_told_by_record = |glass: Interior| !self.world.is_closed(glass.body);
         // With only closed shapes, most hits find at most the shape that they enter.
         if !self.world.has_open_glass() {
             match *found {
                 [] => return (None, known.retained(is_told_by_record)),
-                [Near::Around { object, material }] => {
+                [CoincidentSurface::Around { object, material }] => {
                     let entered = Interior { body: object, material };
                     return (None, known.retained(is_told_by_record).entered(entered));
                 }
-                [Near::Surface { .. }] | [_, _, ..] => {}
+                [CoincidentSurface::Surface { .. }] | [_, _, ..] => {}
             }
         }
         // Begin with the recorded media, without open solids.
@@ -84,16 +84,16 @@ impl TileContext<'_> {
         let mut far = near.retained(is_told_by_record);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
-                Near::Surface { hit, material, is_front } if is_front == as_front => {
+                CoincidentSurface::Surface { hit, material, is_front } if is_front == as_front => {
                     let glass = Interior { body: self.world.body(hit.object), material };
                     self.world.is_glass(material).then_some(glass)
                 }
-                Near::Surface { .. } | Near::Around { .. } => None,
+                CoincidentSurface::Surface { .. } | CoincidentSurface::Around { .. } => None,
             })
         };
         let around = found.iter().filter_map(|thing| match *thing {
-            Near::Around { object, material } => Some(Interior { body: object, material }),
-            Near::Surface { .. } => None,
+            CoincidentSurface::Around { object, material } => Some(Interior { body: object, material }),
+            CoincidentSurface::Surface { .. } => None,
         });
         // Leave the solids whose back faces are here.
         for glass in crossed(false) {
@@ -126,11 +126,11 @@ impl TileContext<'_> {
         }
         // The path hits another one of the coincident surfaces.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
-            Near::Surface { hit, material, .. } => {
+            CoincidentSurface::Surface { hit, material, .. } => {
                 let is_later = self.world.body(hit.object) == later.body && self.world.is_glass(material);
                 is_later.then_some(Boundary { material, hit: Some(hit) })
             }
-            Near::Around { .. } => None,
+            CoincidentSurface::Around { .. } => None,
         });
         Some(of_body.unwrap_or(Boundary { material: later.material, hit: None }))
     }
@@ -143,10 +143,12 @@ impl TileContext<'_> {
         interiors
     }
 
-    fn opaque(&self, thing: &Near) -> Option<Hit> {
+    fn opaque(&self, thing: &CoincidentSurface) -> Option<Hit> {
         match *thing {
-            Near::Around { .. } => None,
-            Near::Surface { hit, material, .. } => (!self.world.is_glass(material)).then_some(hit),
+            CoincidentSurface::Around { .. } => None,
+            CoincidentSurface::Surface { hit, material, .. } => {
+                (!self.world.is_glass(material)).then_some(hit)
+            }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The list of nested glass solids around a ray, which determines its medium.
 
-use crate::materials::Glass;
+use crate::materials::Dielectric;
 use crate::math::Vec3;
 use crate::world::World;
 
@@ -131,7 +131,7 @@ pub fn ior(world: &World, interiors: &InteriorList) -> f32 {
     interiors.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 
-fn glass_of(world: &World, inside: Interior) -> Option<&Glass> {
+fn glass_of(world: &World, inside: Interior) -> Option<&Dielectric> {
     world.materials[inside.material as usize].bsdf.glass()
 }
 

@@ -19,7 +19,7 @@ use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, mask_from_bits, sele
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, Object, PACKET_SIZE, PlainMaterial, SimdKernel};
+use crate::world::{Hit, Object, PACKET_SIZE, PacketMaterial, SimdKernel};
 
 /// Where the rays of a packet are.
 #[derive(Clone, Copy)]
@@ -157,8 +157,8 @@ impl TileContext<'_> {
 
     /// The material and non-specular BSDF of plain surfaces. `None` if the material's surfaces are not plain.
     #[inline(always)]
-    pub fn plain(&self, material: usize) -> Option<(&PlainMaterial, &Rough)> {
-        let (plain, rough) = self.world.plain(material)?;
+    pub fn plain(&self, material: usize) -> Option<(&PacketMaterial, &Rough)> {
+        let (plain, rough) = self.world.packet_material(material)?;
         // The ambient color may be textured, and then needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || plain.ambient.is_some()).then_some((plain, rough))
@@ -229,7 +229,7 @@ impl SimdKernel for PacketIntersection<'_> {
         let any = hits.any(simd);
         let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
         match rays {
-            PacketSource::Camera(..) => in_air = if world.is_eye_in_air() { any } else { 0 },
+            PacketSource::Camera(..) => in_air = if world.is_camera_in_air() { any } else { 0 },
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for lane in 0..PACKET_SIZE {
                     let Some(path) = rays.queued_path(lane) else { break };
@@ -280,7 +280,7 @@ impl PacketIntersection<'_> {
                 continue;
             }
             // Skip materials that are not plain. The first plain one decides the kind of all BSDFs.
-            let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
+            let materials = tile.world.packet_materials(id, of_object, &hits.primitive);
             let (mut of, mut asked_uvs) = (0, None);
             let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
@@ -300,7 +300,7 @@ impl PacketIntersection<'_> {
                 }
                 asked_uvs = asked_uvs.or(own_uvs);
                 of |= alike;
-                plain.shining |= if material.shines() { alike } else { 0 };
+                plain.shining |= if material.is_emissive() { alike } else { 0 };
                 plain.two_sided |= if material.is_two_sided { alike } else { 0 };
                 groups.push((rough, own_uvs.is_some(), alike));
             }
@@ -382,7 +382,7 @@ impl TileContext<'_> {
             if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
-            let materials = self.world.row_of_materials(id, of_object, &hits.primitive);
+            let materials = self.world.packet_materials(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
                 let (material, alike) = group_first(&materials, waiting, simd);

@@ -33,9 +33,9 @@ impl Continuation {
 
     /// The continuation of paths after `depth` bounces, in these lobes.
     pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobeSet) -> Self {
-        let emits = || tile.world.materials.iter().any(|material| material.emission.shines());
+        let emits = || tile.world.materials.iter().any(|material| material.emission.is_emissive());
         let max_depth = tile.settings.render.max_depth;
-        let shines = || tile.world.lights.are_beyond() || emits();
+        let shines = || tile.world.lights.has_infinite_lights() || emits();
         let continues = depth + 1 < max_depth || depth + 1 == max_depth && shines();
         Self { continues, uses_roulette: depth >= Self::MIN_DEPTH, lobes }
     }
@@ -177,7 +177,7 @@ impl SampleBsdf<'_> {
         // Evaluate the BSDF and the pdf.
         let Response { bsdf, cosines } = row.response(&wi, simd);
         let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
-        let grey = row.bsdf.grey(&bsdf);
+        let grey = row.bsdf.max_component(&bsdf);
         let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
             LobeSet::All => bsdf.f,

@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::{PixelSubset, Pixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
-use crate::lights::Receivers;
+use crate::lights::SamplingMode;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::Shadows;
@@ -56,7 +56,7 @@ impl<'a> TileContext<'a> {
             && render.shadows == Shadows::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
-        let lobes_find_sky = is_constant && world.lights.selection(Receivers::Eye).is_none();
+        let lobes_find_sky = is_constant && world.lights.sampler(SamplingMode::Eye).is_none();
         Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 

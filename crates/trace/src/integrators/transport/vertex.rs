@@ -9,10 +9,10 @@ use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
-use crate::materials::{Coated, Footprint, Material, Mirror, Pane, RoughBsdf, TexturePoint};
+use crate::materials::{Coated, Footprint, Material, Mirror, RoughBsdf, TexturePoint, ThinDielectric};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, Sides};
+use crate::world::{Hit, OffsetPoints};
 
 /// A path's vertex on a surface.
 pub struct Vertex<'a> {
@@ -23,7 +23,7 @@ pub struct Vertex<'a> {
     /// [`Ray::start`] of rays that leave the vertex.
     start: u32,
     /// Origins for rays on either side, if they are known more precisely than from the error bound of the surface.
-    sides: Option<Sides>,
+    sides: Option<OffsetPoints>,
     /// Whether the path hits the front face.
     pub is_front: bool,
     /// Whether the surface has texture coordinates; set only for materials that need tangents.
@@ -65,7 +65,7 @@ impl<'a> Vertex<'a> {
     pub fn touching(
         tile: &TileContext<'a>,
         path: &PathRay,
-        (sides, hit): (Sides, &Hit),
+        (sides, hit): (OffsetPoints, &Hit),
         distance: f32,
     ) -> Self {
         Self { sides: Some(sides), ..Self::shaded(tile, path, (&sides.ray(), hit), distance) }
@@ -110,7 +110,7 @@ impl<'a> Vertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
-            has_uv: tile.world.has_coordinates(hit.object),
+            has_uv: tile.world.has_texture_axes(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             wo,
             normal: surface.normal * side,
@@ -123,7 +123,7 @@ impl<'a> Vertex<'a> {
 
     /// Whether the vertex emits toward the path.
     pub fn emits(&self) -> bool {
-        self.material.emission.shines_from(self.is_front)
+        self.material.emission.emits_from(self.is_front)
     }
 
     /// The radiance emitted toward the path. If light samples compete with the path, textures are looked up at the
@@ -150,7 +150,7 @@ impl<'a> Vertex<'a> {
 
     /// Transmittance of a thin pane at this vertex. If light samples compete with the path, the texture is looked up at
     /// the point without filtering, as shadow rays do.
-    pub fn pane_transmittance(&self, path: &PathRay, pane: &Pane, lookups: &mut u64) -> Vec3 {
+    pub fn pane_transmittance(&self, path: &PathRay, pane: &ThinDielectric, lookups: &mut u64) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
         self.tinted(pane.tint.at(&at, lookups).min(Vec3::ONE))
@@ -165,13 +165,14 @@ impl<'a> Vertex<'a> {
     }
 
     /// Sets the origins for rays on either side.
-    pub fn set_sides(&mut self, sides: Sides) {
+    pub fn set_sides(&mut self, sides: OffsetPoints) {
         self.sides = Some(sides);
     }
 
     /// The vertex for transmitted light, on the side that the viewer does not see.
     pub fn behind(&self) -> Self {
-        let turned = |Sides { before, beyond }: Sides| Sides { before: beyond, beyond: before };
+        let turned =
+            |OffsetPoints { before, beyond }: OffsetPoints| OffsetPoints { before: beyond, beyond: before };
         Self {
             normal: -self.normal,
             side: -self.side,
@@ -184,9 +185,11 @@ impl<'a> Vertex<'a> {
     /// The shading normal on the front side: interpolated, then perturbed by the normal or bump map.
     pub fn front_shading_normal(&self, counters: &mut RayCounters) -> Vec3 {
         let surface = &self.surface;
-        let Some(relief) = &self.material.relief else { return surface.shading_normal };
+        let Some(normal_perturbation) = &self.material.normal_perturbation else {
+            return surface.shading_normal;
+        };
         let (normal, tangents) = (surface.shading_normal, [surface.dpdu, surface.dpdv]);
-        relief.bend(&self.texture_point, normal, tangents, &mut counters.texture_lookups)
+        normal_perturbation.perturb(&self.texture_point, normal, tangents, &mut counters.texture_lookups)
     }
 
     /// The shading normals on the viewer's side.
@@ -214,7 +217,7 @@ impl<'a> Vertex<'a> {
         if is_colored {
             mirror.reflectance(cosine, self.color, &self.texture_point, &mut counters.texture_lookups)
         } else {
-            mirror.bleached(cosine)
+            mirror.with_white_textures(cosine)
         }
     }
 

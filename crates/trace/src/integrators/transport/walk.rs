@@ -12,10 +12,10 @@ use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Bsdf, GlassPoint, Pane};
+use crate::materials::{Bsdf, GlassPoint, ThinDielectric};
 use crate::math::Vec3;
 use crate::sampling::Dimension;
-use crate::world::{Hit, MOST_STRAIGHT, Sides};
+use crate::world::{Hit, MAX_NULL_INTERACTIONS, OffsetPoints};
 
 /// Maximum number of surfaces without a change of medium that a ray passes in one walk.
 pub const MAX_HIDDEN: usize = 64;
@@ -65,7 +65,7 @@ pub trait PathStepper<'a> {
         path: &PathRay,
         vertex: &Vertex<'a>,
         hit: OpaqueHit,
-        pane: &Pane,
+        pane: &ThinDielectric,
     ) -> NullInteraction;
 }
 
@@ -140,9 +140,9 @@ pub fn walk<'a, W: PathStepper<'a>>(
         // Stop at an opaque surface, or pass it as a null interaction.
         if vertex.material.bsdf.glass().is_none() {
             path.throughput *= absorption(tile.world, &path.interiors, hit.shape.t);
-            if vertex.material.lets_pass() {
+            if vertex.material.has_null_interaction() {
                 match null_interaction(stepper, path, &vertex, (way, hit)) {
-                    NullInteraction::Passed(_) if way.count == MOST_STRAIGHT => return,
+                    NullInteraction::Passed(_) if way.count == MAX_NULL_INTERACTIONS => return,
                     NullInteraction::Passed(part) => {
                         way = way.behind(path, hit.shape.t);
                         *path = past_surface(*path, &vertex, part);
@@ -167,7 +167,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
                 path.interiors = tile.without_open_glass(path.interiors);
             }
             let mut far = path.interiors;
-            if vertex.material.bsdf.lets_through() && tile.world.has_glass() {
+            if vertex.material.bsdf.is_transmissive() && tile.world.has_glass() {
                 // Light may arrive from glass that touches the surface.
                 let crossing = tile.crossing(path, &vertex, &hit, stepper.crossing());
                 if let Some([_, near]) = crossing.before {
@@ -192,7 +192,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
         }
         if let Some(touching) = opaque {
             let vertex = Vertex::touching(tile, path, (sides, &touching), hit.shape.t);
-            if !vertex.material.lets_pass() || stops_at_touching(stepper, path, &vertex) {
+            if !vertex.material.has_null_interaction() || stops_at_touching(stepper, path, &vertex) {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.straighten(path, touched);
                 let reached = Interaction::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
@@ -238,7 +238,7 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     (vertex, hit): (&Vertex<'a>, &Hit),
-    (sides, far): (Sides, &InteriorList),
+    (sides, far): (OffsetPoints, &InteriorList),
 ) -> Option<GlassPoint> {
     let tile = stepper.tile();
     let interior_lists = [&path.interiors, far];
@@ -265,13 +265,13 @@ fn null_interaction<'a, W: PathStepper<'a>>(
         return NullInteraction::Passed(Vec3::ONE);
     }
     match &vertex.material.bsdf {
-        Bsdf::Pane(pane) => {
+        Bsdf::ThinDielectric(pane) => {
             let mut whole = *path;
             let hit = way.straighten(&mut whole, hit);
             whole.interiors = stepper.tile().without_open_glass(whole.interiors);
             stepper.hit_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
         }
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => NullInteraction::Opaque,
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => NullInteraction::Opaque,
     }
 }
 
@@ -280,8 +280,8 @@ fn null_interaction<'a, W: PathStepper<'a>>(
 #[inline(never)]
 fn stops_at_touching<'a, W: PathStepper<'a>>(stepper: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
     match &vertex.material.bsdf {
-        Bsdf::Pane(_) => false,
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => {
+        Bsdf::ThinDielectric(_) => false,
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Dielectric(_) | Bsdf::Coated(_) => {
             is_opaque(stepper.tile(), path, vertex, stepper.lookups())
         }
     }
@@ -324,7 +324,7 @@ impl TileContext<'_> {
         counters: &mut RayCounters,
     ) -> Option<(PathRay, Hit)> {
         let (mut path, mut hit) = (*path, *hit);
-        for _ in 0..=MOST_STRAIGHT {
+        for _ in 0..=MAX_NULL_INTERACTIONS {
             let vertex = Vertex::for_shading(self, &path, &hit);
             if is_opaque(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));

@@ -8,7 +8,7 @@ use ::image::{ColorType, DynamicImage};
 use super::ImageEncoding;
 use super::facts::{Alpha, Facts};
 use super::space::ColorSpace;
-use crate::materials::PixelNumber;
+use crate::materials::PixelValue;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
@@ -121,7 +121,7 @@ pub(super) fn constant_alpha(
     encoding: ImageEncoding,
     facts: &Facts,
 ) -> Option<&'static str> {
-    let ImageEncoding::Number { of: PixelNumber::Opacity | PixelNumber::Mask { .. }, .. } = encoding else {
+    let ImageEncoding::Number { of: PixelValue::Opacity | PixelValue::Mask { .. }, .. } = encoding else {
         return None;
     };
     let alpha = alpha(image, facts)?;
@@ -129,7 +129,7 @@ pub(super) fn constant_alpha(
         return Some("its alpha is 0 everywhere: the surface is invisible");
     }
     match encoding {
-        ImageEncoding::Number { of: PixelNumber::Mask { of_any_color }, .. }
+        ImageEncoding::Number { of: PixelValue::Mask { of_any_color }, .. }
             if is_everywhere(image, alpha, 1.0) =>
         {
             Some(if numbers::is_gray_mask(image, of_any_color) {

@@ -5,7 +5,7 @@ use ::image::DynamicImage;
 use super::{Sample, alpha, channels, clean, is_everywhere, rgb, with_samples};
 use crate::assets::image::facts::Facts;
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::{Channel, PixelNumber};
+use crate::materials::{Channel, PixelValue};
 use crate::math::Vec3;
 use crate::math::color::{luminance, srgb_to_linear};
 
@@ -21,24 +21,24 @@ enum Samples {
 }
 
 /// The samples that make a number.
-fn samples_of(image: &DynamicImage, (of, is_srgb): (PixelNumber, bool), facts: &Facts) -> Samples {
+fn samples_of(image: &DynamicImage, (of, is_srgb): (PixelValue, bool), facts: &Facts) -> Samples {
     let is_gray = channels(image) < 3;
     let alpha = alpha(image, facts);
     let of_color = |place: usize| Samples::One(if is_gray { 0 } else { place }, is_srgb);
     let luminance = if is_gray { of_color(0) } else { Samples::Luminance };
     let of_alpha = |alpha| Samples::One(alpha, false);
     match of {
-        PixelNumber::Luminance => luminance,
-        PixelNumber::Opacity => alpha.map_or(luminance, of_alpha),
-        PixelNumber::Mask { of_any_color } => {
+        PixelValue::Luminance => luminance,
+        PixelValue::Opacity => alpha.map_or(luminance, of_alpha),
+        PixelValue::Mask { of_any_color } => {
             let is_alpha =
                 |alpha: &usize| !is_everywhere(image, *alpha, 1.0) || !is_gray_mask(image, of_any_color);
             alpha.filter(is_alpha).map_or(luminance, of_alpha)
         }
-        PixelNumber::Channel(Channel::Red) => of_color(0),
-        PixelNumber::Channel(Channel::Green) => of_color(1),
-        PixelNumber::Channel(Channel::Blue) => of_color(2),
-        PixelNumber::Channel(Channel::Alpha) => alpha.map_or(Samples::Nothing, of_alpha),
+        PixelValue::Channel(Channel::Red) => of_color(0),
+        PixelValue::Channel(Channel::Green) => of_color(1),
+        PixelValue::Channel(Channel::Blue) => of_color(2),
+        PixelValue::Channel(Channel::Alpha) => alpha.map_or(Samples::Nothing, of_alpha),
     }
 }
 
@@ -56,7 +56,7 @@ fn has_gray_pixels(image: &DynamicImage) -> bool {
 }
 
 /// One number of each pixel, in all channels of a texel.
-pub(super) fn texels(image: &DynamicImage, of: (PixelNumber, bool), facts: &Facts) -> Texels {
+pub(super) fn texels(image: &DynamicImage, of: (PixelValue, bool), facts: &Facts) -> Texels {
     let (width, height) = (image.width(), image.height());
     let (channels, samples) = (channels(image), samples_of(image, of, facts));
     let mut unusable = 0;
@@ -124,7 +124,7 @@ mod tests {
     use crate::assets::image::ImageEncoding;
     use ::image::ImageBuffer;
 
-    fn number(image: DynamicImage, of: PixelNumber, is_srgb: bool) -> f32 {
+    fn number(image: DynamicImage, of: PixelValue, is_srgb: bool) -> f32 {
         let texels = texels(image, ImageEncoding::Number { of, is_srgb }, &Facts::default());
         let value = texels.get(0, 0);
         assert!(value.x == value.y && value.y == value.z, "{value}");
@@ -135,30 +135,30 @@ mod tests {
     fn a_pixel_stands_for_a_number() {
         let color =
             || DynamicImage::ImageRgba8(ImageBuffer::from_pixel(1, 1, ::image::Rgba([51, 102, 204, 25])));
-        let of = |channel| PixelNumber::Channel(channel);
+        let of = |channel| PixelValue::Channel(channel);
         for (which, exact) in [
             (of(Channel::Red), 0.2),
             (of(Channel::Green), 0.4),
             (of(Channel::Blue), 0.8),
             (of(Channel::Alpha), 25.0 / 255.0),
-            (PixelNumber::Opacity, 25.0 / 255.0),
-            (PixelNumber::Luminance, 0.2126 * 0.2 + 0.7152 * 0.4 + 0.0722 * 0.8),
+            (PixelValue::Opacity, 25.0 / 255.0),
+            (PixelValue::Luminance, 0.2126 * 0.2 + 0.7152 * 0.4 + 0.0722 * 0.8),
         ] {
             assert!((number(color(), which, false) - exact).abs() < 1e-4, "{which:?}");
         }
         // Alpha has no encoding; the other channels are decoded.
-        assert!((number(color(), PixelNumber::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
+        assert!((number(color(), PixelValue::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
         assert!((number(color(), of(Channel::Blue), true) - srgb_to_linear(0.8)).abs() < 1e-6);
         // An image without alpha is opaque, or its luminance counts.
         let grey = || DynamicImage::ImageLuma8(ImageBuffer::from_pixel(1, 1, ::image::Luma([51])));
         assert_eq!(number(grey(), of(Channel::Alpha), false), 1.0);
-        for which in [PixelNumber::Opacity, PixelNumber::Luminance, of(Channel::Green)] {
+        for which in [PixelValue::Opacity, PixelValue::Luminance, of(Channel::Green)] {
             assert!((number(grey(), which, false) - 0.2).abs() < 1e-6, "{which:?}");
         }
         let deep =
             || DynamicImage::ImageLumaA16(ImageBuffer::from_pixel(1, 1, ::image::LumaA([13107, 52428])));
-        assert!((number(deep(), PixelNumber::Opacity, true) - 0.8).abs() < 1e-6);
-        assert!((number(deep(), PixelNumber::Luminance, false) - 0.2).abs() < 1e-6);
+        assert!((number(deep(), PixelValue::Opacity, true) - 0.8).abs() < 1e-6);
+        assert!((number(deep(), PixelValue::Luminance, false) - 0.2).abs() < 1e-6);
         let float =
             || DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(1, 1, ::image::Rgb([2.0, f32::NAN, -1.0])));
         assert_eq!(number(float(), of(Channel::Red), false), 2.0);
@@ -171,7 +171,7 @@ mod tests {
         // A pixel counts once, however many of its samples are broken.
         let broken = texels(
             float(),
-            ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false },
+            ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false },
             &Facts::default(),
         );
         assert_eq!(broken.unusable, 1);

@@ -230,7 +230,7 @@ fn the_encoding_of_the_scene_comes_before_the_file() {
     ] {
         assert_eq!(load_bytes("a.png", &file, encoding).expect("a PNG").data, data);
     }
-    let number = ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false };
+    let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
     let of = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
     assert_eq!(of(&file), of(&png(|_| {})));
 }

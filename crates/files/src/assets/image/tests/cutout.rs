@@ -53,14 +53,14 @@ fn a_mask_without_alpha_of_its_own_is_its_luminance() {
     let number = |image: DynamicImage, of| {
         texels(image, ImageEncoding::Number { of, is_srgb: false }, Alpha::Straight).get(0, 0).x
     };
-    let mask = |of_any_color| PixelNumber::Mask { of_any_color };
+    let mask = |of_any_color| PixelValue::Mask { of_any_color };
     let gray = || bytes(&[[51, 51, 51, 255], [0, 0, 0, 255]]);
     let red = || bytes(&[[255, 0, 0, 255]]);
     for (image, of, expected) in [
         (gray(), mask(false), 0.2),
         (gray(), mask(true), 0.2),
-        (gray(), PixelNumber::Opacity, 1.0),
-        (gray(), PixelNumber::Channel(Channel::Alpha), 1.0),
+        (gray(), PixelValue::Opacity, 1.0),
+        (gray(), PixelValue::Channel(Channel::Alpha), 1.0),
         (red(), mask(false), 1.0),
         (red(), mask(true), 0.2126),
         (bytes(&[[51, 51, 51, 102], [0, 0, 0, 255]]), mask(true), 0.4),
@@ -74,9 +74,8 @@ fn a_mask_without_alpha_of_its_own_is_its_luminance() {
     assert!(warning(gray(), mask(false)).is_some_and(|words| words.contains("its luminance is")));
     assert!(warning(red(), mask(false)).is_some_and(|words| words.contains("is opaque")));
     assert!(
-        warning(bytes(&[[1, 2, 3, 0]]), PixelNumber::Opacity)
-            .is_some_and(|words| words.contains("invisible"))
+        warning(bytes(&[[1, 2, 3, 0]]), PixelValue::Opacity).is_some_and(|words| words.contains("invisible"))
     );
-    assert_eq!(warning(red(), PixelNumber::Opacity), None);
+    assert_eq!(warning(red(), PixelValue::Opacity), None);
     assert_eq!(warning(bytes(&[[1, 2, 3, 9], [1, 2, 3, 255]]), mask(false)), None);
 }

@@ -74,7 +74,7 @@ fn values_are_divided_by_all_exposures_and_corrections() {
     // Quoted lines of other headers do not count.
     assert_eq!(one("\tEXPOSURE=2\n# EXPOSURE=2\n"), plain);
     // The exposure is no matter of encoding.
-    let number = ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false };
+    let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
     for encoding in [ImageEncoding::Linear, ImageEncoding::Raw, number] {
         let [plain, divided] =
             ["", "EXPOSURE=2\n"].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding)[0]);

@@ -18,7 +18,7 @@ fn file(alpha_bits: u8, pixel: [u8; 4], kind: Option<u8>) -> Vec<u8> {
 }
 
 fn opacity(file: &[u8]) -> f32 {
-    let encoding = ImageEncoding::Number { of: PixelNumber::Opacity, is_srgb: false };
+    let encoding = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };
     load_bytes("a.tga", file, encoding).expect("a TGA").get(0, 0).x
 }
 
@@ -56,7 +56,7 @@ fn the_header_or_the_extension_says_what_the_fourth_byte_is() {
 fn a_bitmap_whose_alpha_is_unused_is_opaque() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.bmp");
-    let number = ImageEncoding::Number { of: PixelNumber::Opacity, is_srgb: false };
+    let number = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };
     for (alpha, expected) in [([0, 0], [1.0, 1.0]), ([0, 51], [0.0, 0.2])] {
         let pixels = [255, 255, 255, alpha[0], 255, 255, 255, alpha[1]];
         save_buffer(&path, &pixels, 2, 1, ExtendedColorType::Rgba8).expect("written");

@@ -5,7 +5,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use crate::assets::FileTexture;
-use crate::materials::{Channel, PixelNumber};
+use crate::materials::{Channel, PixelValue};
 use crate::math::{DVec2, Vec2};
 
 /// What a map is of.
@@ -92,7 +92,7 @@ pub(super) struct Map {
     range: [f64; 2],
     is_clamped: bool,
     /// The number of a pixel, if a channel is named.
-    number: Option<PixelNumber>,
+    number: Option<PixelValue>,
     /// Factor on bumps.
     pub(super) strength: f64,
     /// Options without effect.
@@ -176,13 +176,13 @@ impl Map {
 
     fn add_channel(&mut self, rest: &mut Words<'_>) {
         let Some(letter) = rest.word() else { return };
-        let channel = |channel| Some(PixelNumber::Channel(channel));
+        let channel = |channel| Some(PixelValue::Channel(channel));
         self.number = match letter.to_ascii_lowercase().as_str() {
             "r" => channel(Channel::Red),
             "g" => channel(Channel::Green),
             "b" => channel(Channel::Blue),
             "m" => channel(Channel::Alpha),
-            "l" => Some(PixelNumber::Luminance),
+            "l" => Some(PixelValue::Luminance),
             _ => {
                 self.ignored.push(format!("-imfchan {letter}"));
                 None

@@ -3,7 +3,7 @@
 use super::*;
 use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
 use crate::control::{CancelToken, ignore_progress};
-use crate::materials::{Channel, PixelNumber};
+use crate::materials::{Channel, PixelValue};
 use crate::math::{DVec2, Vec2, Vec3};
 
 fn path(texture: &Option<FileTexture>) -> Option<&Path> {
@@ -228,7 +228,7 @@ fn map_options_find_their_fields() {
         found.opacity_texture.expect(statement)
     };
     let plain = || FileTexture::new(PathBuf::from("models/t.png"));
-    let channel = |channel| Some(PixelNumber::Channel(channel));
+    let channel = |channel| Some(PixelValue::Channel(channel));
     for (options, expected) in [
         ("-s 2 3 4", FileTexture { repeat: Vec2::new(2.0, 3.0), ..plain() }),
         ("-s 2", FileTexture { repeat: Vec2::new(2.0, 1.0), ..plain() }),
@@ -242,7 +242,7 @@ fn map_options_find_their_fields() {
         ("-imfchan G", FileTexture { number: channel(Channel::Green), ..plain() }),
         ("-imfchan b", FileTexture { number: channel(Channel::Blue), ..plain() }),
         ("-imfchan m", FileTexture { number: channel(Channel::Alpha), ..plain() }),
-        ("-imfchan l", FileTexture { number: Some(PixelNumber::Luminance), ..plain() }),
+        ("-imfchan l", FileTexture { number: Some(PixelValue::Luminance), ..plain() }),
         (
             "-blendu on -s 2 2 1 -clamp on -o 1",
             FileTexture {

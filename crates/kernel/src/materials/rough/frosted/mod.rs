@@ -1,14 +1,14 @@
-//! Rough glass: a boundary of two dielectrics by microfacets, which reflect and refract (Walter, Marschner, Li, Torrance, *Microfacet
-//! Models for Refraction through Rough Surfaces*, EGSR 2007).
+//! Rough glass: a boundary of two dielectrics made of microfacets that reflect and refract (Walter, Marschner, Li, Torrance,
+//! *Microfacet Models for Refraction through Rough Surfaces*, EGSR 2007).
 //!
-//! With Fresnel's reflectance F of a facet, n the indices of refraction, o the direction to the viewer and i that of the light:
+//! With the Fresnel reflectance F of a facet, indices of refraction n, view direction o and light direction i:
 //!
-//! - reflection f = F·D·G/(4 cosθᵢ cosθₒ), with the facet's normal h along o + i;
-//! - transmission f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), with h along nₒ o + nᵢ i. Light is basic radiance,
-//!   L/n², so that nᵢ² stands where radiance has nₒ², and f/nᵢ² is the same in both directions.
+//! - reflection: f = F·D·G/(4 cosθᵢ cosθₒ), with the facet's normal h along o + i;
+//! - transmission: f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), with h along nₒ o + nᵢ i. Light is basic
+//!   radiance, L/n², so that nᵢ² replaces the nₒ² of radiance, and f/nᵢ² is the same in both directions.
 //!
-//! A surface is two vertices, as [`bsdf`](crate::materials::bsdf) says. Both sample the same facet; of its reflection and its refraction, chance
-//! takes one, by F. So f·cosθᵢ over the pdf is G/G₁ for each.
+//! A surface is two vertices; see [`bsdf`](crate::materials::bsdf). Both sample the same facet, and choose its reflection or its
+//! refraction with probability F. So f·cosθᵢ divided by the pdf is G/G₁ for both.
 
 mod row;
 
@@ -21,7 +21,7 @@ pub use row::GlassRow;
 pub struct GlassPoint {
     /// Index of refraction on the viewer's side.
     pub near: f32,
-    /// Index of refraction on the other side; not that of the viewer's.
+    /// Index of refraction on the other side; differs from the viewer's.
     pub far: f32,
     /// α.
     pub alpha: f32,

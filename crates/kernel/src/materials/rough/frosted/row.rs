@@ -1,15 +1,17 @@
-//! Surfaces of rough glass in rows of sixteen.
+//! Rough glass in packets of 16.
 
 use super::GlassPoint;
 use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes, SideSamples};
 use crate::materials::fresnel::{dielectric_either, transmittance};
-use crate::materials::microfacet::{Half, Leg, facet, facing_one, mirrored_at, refracted_at};
+use crate::materials::microfacet::{
+    Half, SmithTerms, facing_single, reflect_at, refract_at, sample_visible_normal,
+};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, lane, set_lane};
 
-/// Surfaces of rough glass, side by side: their reflection, or their transmission. The values of f that are shared are f of the lobe,
-/// whatever is shown, twice.
+/// A packet of rough glass surfaces: their reflection or their transmission. Both shared values are f of the lobe, whatever is
+/// shown.
 #[derive(Clone, Debug)]
 pub struct GlassRow<const THROUGH: bool> {
     /// Unit normals that face the viewer.
@@ -22,13 +24,13 @@ pub struct GlassRow<const THROUGH: bool> {
     far: F32x16,
     /// [`GlassPoint::alpha`].
     alpha: F32x16,
-    /// 1 where the lobe is shown, else 0.
+    /// 1 where the lobe is shown, otherwise 0.
     shown: F32x16,
-    /// f in sr⁻¹ that is shown in place of the lobe.
+    /// f in sr⁻¹ that is shown instead of the lobe.
     unit: F32x16,
 }
 
-/// Factor on the lobe for what is shown, and f in its place.
+/// Factor on the lobe for the shown lobes, and f shown instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 2] {
     match shown {
@@ -38,13 +40,13 @@ fn shown_parts(shown: ShownLobes) -> [f32; 2] {
 }
 
 impl<const THROUGH: bool> GlassRow<THROUGH> {
-    /// The legs of the viewer and of a direction, each by the normal on its side.
+    /// Smith terms of the viewer and of a direction, each with the normal on its side.
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
+    fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
         let lit = if THROUGH { -normal } else { normal };
-        let eye = Leg::isotropic(normal, lane(&self.to_eye, i), self.alpha[i]);
-        [eye, Leg::isotropic(lit, direction, self.alpha[i])]
+        let eye = SmithTerms::isotropic(normal, lane(&self.to_eye, i), self.alpha[i]);
+        [eye, SmithTerms::isotropic(lit, direction, self.alpha[i])]
     }
 
     /// f of the lobe.
@@ -59,14 +61,14 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         }
         let indices = [self.near[i], self.far[i]];
         let (half, sum) = Half::refracted(normal, [to_eye, direction], indices);
-        // The facet faces the viewer as the surface does, and lets light through if the light is behind both.
+        // The facet must face the viewer like the surface does; light must come from behind both.
         let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
         let cosines = [scale * to_eye.dot(sum), -scale * direction.dot(sum)];
-        let is_through = (cosines[0] > LEAST_COSINE) & (cosines[1] > LEAST_COSINE);
+        let is_through = (cosines[0] > MIN_COSINE) & (cosines[1] > MIN_COSINE);
         let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
         let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha[i])));
         let value = value * (self.far[i] * self.far[i]);
-        // Indices that are equal but for rounding have no half vector.
+        // Nearly equal indices have no usable half vector.
         if is_through & (value < f32::MAX) { value } else { 0.0 }
     }
 }
@@ -83,22 +85,23 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
         simd.call(SideSampling { row: self, choices, u })
     }
 
-    /// Samples a facet of each surface, and by chance its reflection or its refraction. All formulas are by the facet's normal, which
-    /// is the half vector of both directions.
+    /// Samples a facet of each surface, and randomly chooses its reflection or its refraction. All formulas use the facet's
+    /// normal, which is the half vector of both directions.
     #[inline(always)]
     pub(super) fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2]) -> SideSamples {
         let (mut directions, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
         let (mut densities, mut shares) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
-            let half = facet(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
+            let half =
+                sample_visible_normal(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
             let indices = [self.near[i], self.far[i]];
             let eta = indices[1] / indices[0];
             let cosine = half.dot(to_eye);
             let reflectance = dielectric_either(cosine, eta);
             let is_mirrored = choices[i] < reflectance;
             let choose = |mirrored: f32, refracted: f32| if is_mirrored { mirrored } else { refracted };
-            let (mirrored, refracted) = (mirrored_at(half, to_eye), refracted_at(half, to_eye, eta));
+            let (mirrored, refracted) = (reflect_at(half, to_eye), refract_at(half, to_eye, eta));
             let direction = Vec3::new(
                 choose(mirrored.x, refracted.x),
                 choose(mirrored.y, refracted.y),
@@ -106,19 +109,19 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
             );
             set_lane(&mut directions, i, direction);
             beyond[i] = if is_mirrored == THROUGH { TRUE } else { 0 };
-            // Weigh the facet by what it sends there, per solid angle.
+            // Compute the facet's contribution per solid angle.
             let behind = -half.dot(refracted);
             let sum = indices[0] * cosine - indices[1] * behind;
             let through = 4.0 * (cosine * behind * transmittance([cosine, behind], indices) / (sum * sum));
             let by_facet = choose(reflectance, through * (indices[1] * indices[1]));
-            let is_through = (cosine > LEAST_COSINE) & (behind > LEAST_COSINE);
-            // The light is on the facet's side of the surface, or nothing arrives.
-            let eye = Leg::isotropic(normal, to_eye, alpha);
+            let is_through = (cosine > MIN_COSINE) & (behind > MIN_COSINE);
+            // Light on the wrong side of the surface does not count.
+            let eye = SmithTerms::isotropic(normal, to_eye, alpha);
             let side = choose(1.0, -1.0);
-            let light = Leg::isotropic(normal * side, direction, alpha);
+            let light = SmithTerms::isotropic(normal * side, direction, alpha);
             let along = normal.dot(half);
             let half = Half { squared: 1.0, along, across: half - normal * along };
-            let density = by_facet * eye.density(half.isotropic(alpha));
+            let density = by_facet * eye.pdf(half.isotropic(alpha));
             let is_seen =
                 light.is_ahead() & eye.is_ahead() & (is_mirrored | is_through) & (density < f32::MAX);
             densities[i] = if is_seen { density } else { 0.0 };
@@ -130,7 +133,7 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
     }
 }
 
-/// A call of [`GlassRow::sample_sides`].
+/// Kernel of [`GlassRow::sample_sides`].
 struct SideSampling<'a, const THROUGH: bool> {
     row: &'a GlassRow<THROUGH>,
     choices: &'a F32x16,
@@ -146,8 +149,8 @@ impl<const THROUGH: bool> SimdKernel for SideSampling<'_, THROUGH> {
     }
 }
 
-/// Least cosine between a facet's normal and a direction.
-const LEAST_COSINE: f32 = 1e-6;
+/// Minimum cosine between a facet's normal and a direction.
+const MIN_COSINE: f32 = 1e-6;
 
 impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     type Point = GlassPoint;
@@ -166,7 +169,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        if THROUGH { -facing_one(-normal, to_eye) } else { facing_one(normal, to_eye) }
+        if THROUGH { -facing_single(-normal, to_eye) } else { facing_single(normal, to_eye) }
     }
 
     #[inline(always)]
@@ -215,7 +218,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> F32x16 {
+    fn max_component(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
@@ -224,7 +227,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
         let mut densities = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let [eye, light] = self.legs(i, lane(directions, i));
-            densities[i] = eye.density_of(&light, values.shared[1][i]);
+            densities[i] = eye.pdf_from_reflected(&light, values.shared[1][i]);
         }
         densities
     }
@@ -234,11 +237,12 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
         let mut directions = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
-            let half = facet(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
-            // Chance chooses between both sides, and where it goes on at the other one, the direction is of no use.
+            let half =
+                sample_visible_normal(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
+            // The other side's vertex continues if this choice fails; the direction is then unused.
             let eta = self.far[i] / self.near[i];
             let is_mirrored = choices[i] < dielectric_either(half.dot(to_eye), eta);
-            let direction = if THROUGH { refracted_at(half, to_eye, eta) } else { mirrored_at(half, to_eye) };
+            let direction = if THROUGH { refract_at(half, to_eye, eta) } else { reflect_at(half, to_eye) };
             let useless = if THROUGH { normal } else { -normal };
             let choose = |own: f32, useless: f32| if is_mirrored == THROUGH { useless } else { own };
             let chosen = Vec3::new(
@@ -269,9 +273,10 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
         if !THROUGH {
             return Some(NarrowLobe::of_microfacets(normal, to_eye, alpha, reflectance, 0.0));
         }
-        // A facet that turns by an angle turns what it refracts at normal incidence by 1 − 1/η of that, where a mirror has 2.
+        // Rotating a facet by an angle rotates what it refracts at normal incidence by 1 − 1/η of it, whereas a reflection
+        // rotates by twice the angle.
         let turn = 0.5 * (1.0 - 1.0 / eta).abs() * alpha;
-        let axis = refracted_at(normal, to_eye, eta);
+        let axis = refract_at(normal, to_eye, eta);
         let lobe = NarrowLobe { axis, ..NarrowLobe::of_microfacets(normal, to_eye, turn, 1.0, 0.0) };
         (reflectance < 1.0).then_some(lobe)
     }
@@ -282,7 +287,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn even(&self, _: usize) -> Option<Vec3> {
+    fn constant_f(&self, _: usize) -> Option<Vec3> {
         None
     }
 

@@ -1,31 +1,32 @@
-//! Lobes of rough glass against the formulas in `f64`, their samples against the pdf, and their albedos against quadrature.
+//! Tests of rough glass: values against `f64` formulas, samples against pdfs, and albedos against quadrature.
 
 use super::*;
 use crate::materials::bsdf::{LobeSet, RoughRow};
 use crate::materials::fresnel::dielectric;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, Light, SideSample, Subject, check_neighbours, check_neighbours_lit, direction, reference,
+    ALPHAS, COSINES, LitFrom, SideSample, Subject, check_neighbours, check_neighbours_lit, direction,
+    reference,
 };
 use crate::math::DVec3;
 use crate::math::random::unit as random;
 
 use std::f64::consts::{PI, TAU};
 
-/// Indices of refraction on the viewer's side and on the other.
+/// Indices of refraction on the viewer's side and on the other side.
 const INDICES: [[f32; 2]; 5] = [[1.0, 1.5], [1.5, 1.0], [1.0, 1.33], [2.4, 1.0], [1.5, 1.33]];
 
 fn glass([near, far]: [f32; 2], alpha: f32) -> GlassPoint {
     GlassPoint { near, far, alpha }
 }
 
-/// Both parts of a surface, seen from a direction.
+/// The reflection and the transmission of a surface, seen from a direction.
 fn parts(point: &GlassPoint, to_eye: DVec3) -> (Subject<GlassRow<false>>, Subject<GlassRow<true>>) {
     let (alphas, eta) = ([point.alpha; 2], f64::from(point.far) / f64::from(point.near));
     let reflection = Subject::new(point, alphas, to_eye);
-    (reflection, Subject::lit(point, alphas, to_eye, Light::Refracted(eta)))
+    (reflection, Subject::lit(point, alphas, to_eye, LitFrom::Refracted(eta)))
 }
 
-/// f of basic radiance that comes through, as Walter et al. write it (equations 16, 20, 21 and 33, with this G).
+/// Transmission f for basic radiance, as in Walter et al. (equations 16, 20, 21 and 33, with our G).
 fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
     let [near, far, alpha] = [point.near, point.far, point.alpha].map(f64::from);
     let half = -(i * far + o * near).normalize();
@@ -46,7 +47,7 @@ fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
     (cos_o * cos_i / (o.z * i.z)).abs() * (1.0 - fresnel) * shadowing * distribution * jacobian
 }
 
-/// Fresnel's reflectance in `f64`.
+/// Fresnel reflectance in `f64`.
 fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
     let squared = eta * eta - 1.0 + cosine * cosine;
     if squared <= 0.0 {
@@ -58,13 +59,13 @@ fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// A pair of directions about the peak of the lobe, or anywhere.
+/// A pair of directions, near the lobe's peak or anywhere.
 fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (DVec3, Option<DVec3>) {
     let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
     let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
     if is_near {
         let eta = f64::from(point.far) / f64::from(point.near);
-        let there = Subject::<GlassRow<true>>::lit(point, [point.alpha; 2], to_eye, Light::Refracted(eta));
+        let there = Subject::<GlassRow<true>>::lit(point, [point.alpha; 2], to_eye, LitFrom::Refracted(eta));
         (to_eye, there.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3()))
     } else {
         let way = direction(f64::from(0.05 + 0.95 * next()), turn);
@@ -73,12 +74,12 @@ fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (D
 }
 
 #[test]
-fn what_comes_through_is_what_the_formulas_say_and_reciprocal() {
+fn transmission_matches_the_formulas() {
     let mut next = random(9);
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         let point = glass(indices, alpha);
         let back = glass([indices[1], indices[0]], alpha);
-        // A half vector of indices that are close has less digits.
+        // Half vectors lose digits if the indices are close.
         let least = f64::from((1.5 - 1.0_f32).min((indices[0] - indices[1]).abs()));
         let (reciprocity, error) = if alpha >= 0.05 { (1e-5, 3e-5) } else { (1e-3, 4e-3) };
         for trial in 0..400 {
@@ -88,13 +89,13 @@ fn what_comes_through_is_what_the_formulas_say_and_reciprocal() {
             }
             let eta = f64::from(indices[1]) / f64::from(indices[0]);
             let subject = |point: &GlassPoint, eye: DVec3, eta: f64| {
-                Subject::<GlassRow<true>>::lit(point, [alpha; 2], eye, Light::Refracted(eta))
+                Subject::<GlassRow<true>>::lit(point, [alpha; 2], eye, LitFrom::Refracted(eta))
             };
             let value = |point: &GlassPoint, eye: DVec3, light: DVec3, eta: f64| {
                 subject(point, eye, eta).values(LobeSet::All, &[light])[0].0.x
             };
             let there = value(&point, to_eye, light, eta);
-            // Turn both, so that the other side is above.
+            // Flip both directions, so that the other side is up.
             let [eye, light_back] = [light, to_eye].map(|one| DVec3::new(one.x, one.y, -one.z));
             let again = value(&back, eye, light_back, 1.0 / eta);
             let [near, far] = indices.map(f64::from);
@@ -111,7 +112,7 @@ fn what_comes_through_is_what_the_formulas_say_and_reciprocal() {
 }
 
 #[test]
-fn what_is_reflected_is_what_the_formulas_say_and_reciprocal() {
+fn reflection_matches_the_formulas() {
     let mut next = random(10);
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         let point = glass(indices, alpha);
@@ -134,7 +135,7 @@ fn what_is_reflected_is_what_the_formulas_say_and_reciprocal() {
                 let eta = f64::from(point.far) / f64::from(point.near);
                 let fresnel = exact_reflectance((o + i).length() * 0.5, eta);
                 let exact = fresnel * reference(o, i, [f64::from(alpha); 2]);
-                // Just before total reflection, the reflectance rises without bound.
+                // Near total reflection, the slope of the reflectance is unbounded.
                 let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 } else { 1.0 };
                 assert!(
                     (there - exact).abs() <= room * error * exact + 1e-12,
@@ -146,8 +147,8 @@ fn what_is_reflected_is_what_the_formulas_say_and_reciprocal() {
 }
 
 #[test]
-fn samples_of_both_sides_are_drawn_by_their_density() {
-    // Three boundaries, seven lobes, five directions, both sides: 210 pairs.
+fn samples_of_both_sides_follow_the_pdf() {
+    // Three boundaries, seven lobes, five directions, both sides: 210 cases.
     for (indices, alpha) in INDICES[..3].iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.7));
@@ -159,12 +160,12 @@ fn samples_of_both_sides_are_drawn_by_their_density() {
 }
 
 #[test]
-fn reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_all() {
+fn two_sided_albedos_match_quadrature() {
     for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
         for cosine in COSINES {
             let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.3));
             let sampled = [reflection.albedo_by_choices(128).x, transmission.albedo_by_choices(128).x];
-            // Total reflection begins at a ring.
+            // Total reflection begins at a ring, which needs fine steps.
             let exact = [reflection.albedo_by_rings(1000).x, transmission.albedo_by_rings(1000).x];
             let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}: {sampled:?}, {exact:?}");
             let (sum, sum_exact) = (sampled[0] + sampled[1], exact[0] + exact[1]);
@@ -178,7 +179,7 @@ fn reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_
 }
 
 #[test]
-fn narrow_lobes_reflect_as_smooth_glass_does() {
+fn narrow_lobes_approach_smooth_glass() {
     for indices in INDICES {
         for cosine in [0.3, 0.7, 1.0] {
             let (reflection, transmission) = parts(&glass(indices, 0.001), direction(cosine, 0.2));
@@ -187,20 +188,20 @@ fn narrow_lobes_reflect_as_smooth_glass_does() {
             assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected} is not {smooth}");
             assert!(
                 (through + smooth - 1.0).abs() < 1e-3,
-                "{indices:?}, {cosine}: {through} beside {smooth}"
+                "{indices:?}, {cosine}: {through} + {smooth} is not 1"
             );
         }
     }
 }
 
 #[test]
-fn a_path_goes_on_at_exactly_one_side() {
+fn paths_continue_on_exactly_one_side() {
     for indices in INDICES {
         let (reflection, transmission) = parts(&glass(indices, 0.4), direction(0.5, 0.3));
         let (up, down) = (reflection.samples(LobeSet::All, 32), transmission.samples(LobeSet::All, 32));
         let mut reflected = 0;
         for (up, down) in up.into_iter().zip(down) {
-            // The same numbers choose at both; the other one gets the direction into the surface.
+            // Both sides use the same random numbers; the unused side gets the direction into the surface.
             let goes_on = [up != DVec3::NEG_Z, down != DVec3::Z];
             assert!(goes_on[0] != goes_on[1], "{up} {down}");
             reflected += u32::from(goes_on[0]);
@@ -210,7 +211,7 @@ fn a_path_goes_on_at_exactly_one_side() {
 }
 
 #[test]
-fn one_vertex_for_both_sides_goes_on_as_two_do() {
+fn two_sided_samples_match_one_sided_ones() {
     for (indices, alpha) in INDICES.iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
         for cosine in COSINES {
             let point = glass(indices, alpha);
@@ -227,15 +228,14 @@ fn one_vertex_for_both_sides_goes_on_as_two_do() {
             ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
-                // The vertices of both sides go on alike: at one of them, on its own side.
+                // Both sides' vertices continue identically: on one side only.
                 assert_eq!((up.direction, up.density, up.share), (down.direction, down.density, down.share));
                 assert_ne!(up.is_beyond, down.is_beyond, "{what}");
                 let side = usize::from(up.is_beyond);
                 assert_eq!(up.direction, alone[side][i], "{what}");
                 let (f, _, pdf) = by_directions[side][i];
                 let (f, height) = (f.x, up.direction.z * [1.0, -1.0][side]);
-                // By the directions, a narrow lobe has less digits; so have close indices, and facets just before total
-                // reflection.
+                // Recomputed from directions, narrow lobes lose digits; so do close indices, and facets near total reflection.
                 let least = f64::from((indices[0] - indices[1]).abs()).min(0.5);
                 let there = if side == 0 { indices[0] } else { indices[1] };
                 let half = (direction(cosine, 0.3) * f64::from(indices[0]) + up.direction * f64::from(there))
@@ -262,10 +262,10 @@ fn one_vertex_for_both_sides_goes_on_as_two_do() {
 }
 
 #[test]
-fn a_surface_gets_the_bits_that_it_gets_alone() {
+fn lanes_are_independent() {
     let points: Vec<GlassPoint> =
         INDICES.into_iter().flat_map(|one| [0.001, 0.2, 1.0].map(|alpha| glass(one, alpha))).collect();
     check_neighbours::<GlassRow<false>>(&points);
-    check_neighbours_lit::<GlassRow<true>>(&points, Light::Through);
+    check_neighbours_lit::<GlassRow<true>>(&points, LitFrom::Through);
     const { assert!(GlassRow::<true>::SENDS_RAYS) };
 }

@@ -1,4 +1,4 @@
-//! Metal: microfacets under Fresnel's equations for conductors, or under their approximation from a colour.
+//! Conductors: microfacets with exact Fresnel equations, or with Schlick's approximation from a color.
 
 pub mod elements;
 mod row;
@@ -9,34 +9,34 @@ use crate::materials::bsdf::{RoughMaterial, RoughPoint};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::fresnel::{conductor, schlick_weight};
 use crate::materials::microfacet;
-use crate::materials::number::Number;
+use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
-pub use row::MetalRow;
+pub use row::ConductorRow;
 
-/// Row of metals that are the same in all azimuths.
-pub type RoundMetalRow = MetalRow<false>;
+/// A packet of isotropic conductors.
+pub type IsotropicConductorRow = ConductorRow<false>;
 
-/// Row of brushed metals.
-pub type BrushedMetalRow = MetalRow<true>;
+/// A packet of brushed conductors.
+pub type BrushedConductorRow = ConductorRow<true>;
 
-/// Reflection of a conductor, rough and of one lobe.
+/// A rough conductor with a single lobe.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Metal {
+pub struct Conductor {
     /// Reflectance of its facets.
-    pub fresnel: MetalFresnel,
-    /// The root of α.
+    pub fresnel: ConductorFresnel,
+    /// The square root of α.
     pub roughness: Number,
     /// Stretch along u in [−1, 1].
     pub anisotropy: Number,
 }
 
-/// Reflectance of a smooth conductor by the angle.
+/// Reflectance of a smooth conductor as a function of the angle.
 #[derive(Clone, Debug, PartialEq)]
-pub enum MetalFresnel {
-    /// Schlick's approximation, by the reflectance at normal incidence.
+pub enum ConductorFresnel {
+    /// Schlick's approximation, from the reflectance at normal incidence.
     Schlick(Color),
-    /// Exact equations, by the complex index of refraction.
+    /// Exact equations, with the complex index of refraction.
     Index {
         /// Its real part for red, green and blue.
         eta: Color,
@@ -45,7 +45,7 @@ pub enum MetalFresnel {
     },
 }
 
-/// [`MetalFresnel`] at one point.
+/// [`ConductorFresnel`] at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FresnelPoint {
     /// The reflectance at normal incidence, or η.
@@ -54,17 +54,17 @@ pub struct FresnelPoint {
     pub second: Vec3,
 }
 
-/// [`Metal`] at one point: its textures looked up.
+/// [`Conductor`] at one point, with its textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MetalPoint {
+pub struct ConductorPoint {
     /// Reflectance of its facets.
     pub fresnel: FresnelPoint,
     /// α along u and along v.
     pub alphas: [f32; 2],
 }
 
-impl MetalFresnel {
-    /// Looks its textures up.
+impl ConductorFresnel {
+    /// Looks up its textures.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
         match self {
@@ -73,16 +73,16 @@ impl MetalFresnel {
         }
     }
 
-    /// With white in place of its textures.
-    pub fn bleached(&self) -> FresnelPoint {
-        let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
+    /// The same with white textures.
+    pub fn with_white_textures(&self) -> FresnelPoint {
+        let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         match self {
-            Self::Schlick(color) => FresnelPoint::schlick(bleached(color)),
-            Self::Index { eta, k } => FresnelPoint::index(bleached(eta), bleached(k)),
+            Self::Schlick(color) => FresnelPoint::schlick(with_white_textures(color)),
+            Self::Index { eta, k } => FresnelPoint::index(with_white_textures(eta), with_white_textures(k)),
         }
     }
 
-    /// Its constant value. `None` if it has textures.
+    /// Its value, if it has no textures.
     pub fn constant(&self) -> Option<FresnelPoint> {
         match self {
             Self::Schlick(color) => color.constant().map(FresnelPoint::schlick),
@@ -101,23 +101,24 @@ impl MetalFresnel {
 }
 
 impl FresnelPoint {
-    /// Schlick's approximation, by the reflectance at normal incidence, at most 1.
+    /// Schlick's approximation, with a reflectance at normal incidence of at most 1.
     pub fn schlick(reflectance: Vec3) -> Self {
         Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
     }
 
-    /// Exact equations, by the complex index of refraction. From 1e8 on every metal reflects all, and squares of squares overflow.
+    /// Exact equations, with the complex index of refraction. Above 1e8, every metal reflects all light, and fourth powers would
+    /// overflow.
     pub fn index(eta: Vec3, k: Vec3) -> Self {
         const MOST: Vec3 = Vec3::splat(1e8);
         Self { first: eta.min(MOST), second: k.min(MOST) }
     }
 
-    /// With its colour multiplied by another one; an index of refraction is no colour.
+    /// The same with its color multiplied by `color`. An index of refraction is not a color and stays unchanged.
     pub fn tinted(self, color: Vec3) -> Self {
         if self.second.x < 0.0 { Self { first: self.first * color, ..self } } else { self }
     }
 
-    /// The reflectance by the cosine of the angle of incidence.
+    /// The reflectance at a cosine of the angle of incidence.
     pub fn reflectance(&self, cosine: f32) -> Vec3 {
         let of = |first, second| reflectance(first, second, cosine, schlick_weight(cosine));
         let Self { first, second } = self;
@@ -125,7 +126,7 @@ impl FresnelPoint {
     }
 }
 
-/// Reflectance of a facet in one colour, given [`schlick_weight`] of the cosine of the angle to it.
+/// Reflectance of a facet in one channel, given [`schlick_weight`] of the cosine.
 #[inline(always)]
 fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
     let exact = conductor(cosine, first, second);
@@ -133,29 +134,32 @@ fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
     if second < 0.0 { approximate } else { exact }
 }
 
-impl RoughMaterial for Metal {
-    type Point = MetalPoint;
+impl RoughMaterial for Conductor {
+    type Point = ConductorPoint;
 
     #[inline]
-    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> MetalPoint {
+    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> ConductorPoint {
         let roughness = self.roughness.at(at, lookups);
         let anisotropy = self.anisotropy.at(at, lookups);
-        MetalPoint {
+        ConductorPoint {
             fresnel: self.fresnel.at(at, lookups),
             alphas: microfacet::alphas(roughness, anisotropy.clamp(-1.0, 1.0)),
         }
     }
 
-    fn bleached(&self) -> MetalPoint {
+    fn with_white_textures(&self) -> ConductorPoint {
         let roughness = self.roughness.constant().unwrap_or(1.0);
         let anisotropy = self.anisotropy.constant().unwrap_or(0.0);
-        MetalPoint { fresnel: self.fresnel.bleached(), alphas: microfacet::alphas(roughness, anisotropy) }
+        ConductorPoint {
+            fresnel: self.fresnel.with_white_textures(),
+            alphas: microfacet::alphas(roughness, anisotropy),
+        }
     }
 
     #[inline]
-    fn constant(&self) -> Option<MetalPoint> {
+    fn constant(&self) -> Option<ConductorPoint> {
         let alphas = microfacet::alphas(self.roughness.constant()?, self.anisotropy.constant()?);
-        Some(MetalPoint { fresnel: self.fresnel.constant()?, alphas })
+        Some(ConductorPoint { fresnel: self.fresnel.constant()?, alphas })
     }
 
     #[inline]
@@ -188,7 +192,7 @@ impl RoughMaterial for Metal {
     }
 }
 
-impl RoughPoint for MetalPoint {
+impl RoughPoint for ConductorPoint {
     #[inline]
     fn is_black(&self) -> bool {
         false

@@ -1,38 +1,40 @@
-//! Surfaces of metal in rows of sixteen.
+//! Conductors in packets of 16.
 
-use super::{FresnelPoint, Metal, MetalPoint, reflectance};
+use super::{Conductor, ConductorPoint, FresnelPoint, reflectance};
 use crate::materials::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::microfacet::{Half, Leg, facing_one, frame_along, mirrored, turn_to_viewers};
+use crate::materials::microfacet::{
+    Half, SmithTerms, facing_single, frame_along, orient_to_viewers, sample_reflection,
+};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
 
-/// Surfaces of metal, side by side, all in all azimuths alike or all brushed: a lane gets the bits that it would get alone. The values of f that are shared are the largest component of f, whatever is shown, and f for a
-/// reflectance of 1.
+/// A packet of conductors, either all isotropic or all brushed; the result of a lane does not depend on the other lanes. The
+/// shared values of f are its largest component, whether the renderer is monochrome or in color, and f for a reflectance of 1.
 #[derive(Clone, Debug)]
-pub struct MetalRow<const BRUSHED: bool> {
+pub struct ConductorRow<const BRUSHED: bool> {
     /// Unit normals that face the viewer.
     normal: Vec3x16,
     /// Unit directions to the viewer.
     to_eye: Vec3x16,
-    /// Directions along u; without brushed surfaces anything.
+    /// Directions along u; arbitrary for isotropic surfaces.
     tangent: Vec3x16,
     /// α along u and along v.
     alphas: [F32x16; 2],
     /// [`FresnelPoint::first`] and [`FresnelPoint::second`].
     fresnel: [Vec3x16; 2],
-    /// 1 where the lobe is shown, else 0.
+    /// 1 where the lobe is shown, otherwise 0.
     shown: F32x16,
-    /// f in sr⁻¹ that is shown in place of the lobe.
+    /// f in sr⁻¹ that is shown instead of the lobe.
     unit: F32x16,
-    /// Whether any surface has an index of refraction in place of a colour.
+    /// Whether any surface has an index of refraction instead of a color.
     has_index: bool,
 }
 
-/// Factor on the lobe for what is shown, and f in its place.
+/// Factor on the lobe for the shown lobes, and f shown instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 2] {
     match shown {
@@ -41,7 +43,7 @@ fn shown_parts(shown: ShownLobes) -> [f32; 2] {
     }
 }
 
-impl<const BRUSHED: bool> MetalRow<BRUSHED> {
+impl<const BRUSHED: bool> ConductorRow<BRUSHED> {
     #[inline(always)]
     fn frame(&self, i: usize) -> Frame {
         let normal = lane(&self.normal, i);
@@ -53,17 +55,20 @@ impl<const BRUSHED: bool> MetalRow<BRUSHED> {
         [self.alphas[0][i], self.alphas[1][i]]
     }
 
-    /// The legs of the viewer and of a direction.
+    /// Smith terms of the viewer and of a direction.
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
+    fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let to_eye = lane(&self.to_eye, i);
-        // Not by `map`, which may stay a call and leave the loops around it scalar.
+        // Avoid `map`, which may not be inlined and would keep the surrounding loops scalar.
         if BRUSHED {
             let (frame, alphas) = (self.frame(i), self.alphas(i));
-            [Leg::anisotropic(&frame, to_eye, alphas), Leg::anisotropic(&frame, direction, alphas)]
+            [
+                SmithTerms::anisotropic(&frame, to_eye, alphas),
+                SmithTerms::anisotropic(&frame, direction, alphas),
+            ]
         } else {
             let (normal, alpha) = (lane(&self.normal, i), self.alphas[0][i]);
-            [Leg::isotropic(normal, to_eye, alpha), Leg::isotropic(normal, direction, alpha)]
+            [SmithTerms::isotropic(normal, to_eye, alpha), SmithTerms::isotropic(normal, direction, alpha)]
         }
     }
 
@@ -89,8 +94,8 @@ impl<const BRUSHED: bool> MetalRow<BRUSHED> {
     }
 }
 
-impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
-    type Point = MetalPoint;
+impl<const BRUSHED: bool> RoughRow for ConductorRow<BRUSHED> {
+    type Point = ConductorPoint;
 
     const SENDS_RAYS: bool = true;
 
@@ -107,7 +112,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        facing_one(normal, to_eye)
+        facing_single(normal, to_eye)
     }
 
     #[inline(always)]
@@ -116,13 +121,13 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &MetalPoint, shown: ShownLobes, place: &Place) {
+    fn put(&mut self, i: usize, bsdf: &ConductorPoint, shown: ShownLobes, place: &Place) {
         let &Place { normal, to_eye, tangent } = place;
         set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.to_eye, i, to_eye);
         set_lane(&mut self.tangent, i, tangent);
         self.set_fresnel(i, &bsdf.fresnel);
-        // Without coordinates it is isotropic: the geometric mean of both is α.
+        // Without texture coordinates it is isotropic: α is the geometric mean of both.
         let [u, v] = bsdf.alphas;
         let mean = (u * v).sqrt();
         let [u, v] = if tangent == Vec3::ZERO { [mean; 2] } else { [u, v] };
@@ -155,7 +160,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
         for i in 0..PACKET_SIZE {
             [white[i], cosines[i]] = self.lobe(i, lane(directions, i));
         }
-        // Multiply by the reflectance of the facets.
+        // Multiply by the facets' reflectance.
         let mut f = [[0.0; PACKET_SIZE]; 3];
         if self.has_index {
             for axis in 0..3 {
@@ -172,7 +177,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
                 set_lane(&mut f, i, (first + (Vec3::ONE - first) * weight) * white[i]);
             }
         }
-        // Keep what is shown.
+        // Keep only the shown lobes.
         let mut largest = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let all = lane(&f, i);
@@ -188,7 +193,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> F32x16 {
+    fn max_component(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
@@ -197,7 +202,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
         let mut densities = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let [eye, light] = self.legs(i, lane(directions, i));
-            densities[i] = eye.density_of(&light, values.shared[1][i]);
+            densities[i] = eye.pdf_from_reflected(&light, values.shared[1][i]);
         }
         densities
     }
@@ -207,7 +212,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
         let mut directions = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
             let u = [u[0][i], u[1][i]];
-            let direction = mirrored(&self.frame(i), lane(&self.to_eye, i), self.alphas(i), u);
+            let direction = sample_reflection(&self.frame(i), lane(&self.to_eye, i), self.alphas(i), u);
             set_lane(&mut directions, i, direction);
         }
         directions
@@ -235,7 +240,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn even(&self, _: usize) -> Option<Vec3> {
+    fn constant_f(&self, _: usize) -> Option<Vec3> {
         None
     }
 
@@ -247,18 +252,19 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 }
 
-impl<const BRUSHED: bool> MaterialRow for MetalRow<BRUSHED> {
-    type Material = Metal;
+impl<const BRUSHED: bool> MaterialRow for ConductorRow<BRUSHED> {
+    type Material = Conductor;
 
     #[inline(always)]
     fn fill(
         &mut self,
-        material: &Metal,
+        material: &Conductor,
         _: Option<&UvRow>,
         shown: &[(u32, ShownLobes)],
         _: impl Simd,
     ) -> u32 {
-        let MetalPoint { fresnel, alphas } = material.constant().unwrap_or_else(|| material.bleached());
+        let ConductorPoint { fresnel, alphas } =
+            material.constant().unwrap_or_else(|| material.with_white_textures());
         for &(of, shown) in shown {
             let (of, [part, unit]) = (mask_from_bits(of), shown_parts(shown));
             for axis in 0..3 {
@@ -276,6 +282,6 @@ impl<const BRUSHED: bool> MaterialRow for MetalRow<BRUSHED> {
 
     #[inline(always)]
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
-        turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
+        orient_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
     }
 }

@@ -1,4 +1,4 @@
-//! Lobes of metal against the formulas in `f64`, their samples against the pdf, and their albedos against quadrature.
+//! Tests of conductor lobes: values against `f64` formulas, samples against pdfs, and albedos against quadrature.
 
 use super::elements::Element;
 use super::*;
@@ -9,32 +9,37 @@ use crate::materials::rough::lobe_tests::{
 };
 use crate::math::DVec3;
 
-/// α along u and v for each α: round, and long along u or along v.
+/// α along u and v for each α: isotropic, stretched along v, and stretched along u.
 fn shapes(alpha: f32) -> [[f32; 2]; 3] {
     [[alpha; 2], [alpha, (3.0 * alpha).min(1.0)], [(2.0 * alpha).min(1.0), alpha]]
 }
 
-fn schlick(alphas: [f32; 2]) -> MetalPoint {
-    MetalPoint { fresnel: FresnelPoint::schlick(Vec3::new(1.0, 0.78, 0.34)), alphas }
+fn schlick(alphas: [f32; 2]) -> ConductorPoint {
+    ConductorPoint { fresnel: FresnelPoint::schlick(Vec3::new(1.0, 0.78, 0.34)), alphas }
 }
 
-fn of_element(element: Element, alphas: [f32; 2]) -> MetalPoint {
+fn of_element(element: Element, alphas: [f32; 2]) -> ConductorPoint {
     let [first, second] = element.index();
-    MetalPoint { fresnel: FresnelPoint { first, second }, alphas }
+    ConductorPoint { fresnel: FresnelPoint { first, second }, alphas }
 }
 
 #[test]
-fn values_are_those_of_the_formulas_and_reciprocal() {
+fn values_match_the_formulas_and_are_reciprocal() {
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         let wide = alphas.map(f64::from);
         let cosine = |o: DVec3, i: DVec3| (o + i).length() * 0.5;
         let first = DVec3::new(1.0, 0.78, 0.34);
-        check_values::<BrushedMetalRow>(&format!("Schlick {alphas:?}"), &schlick(alphas), alphas, |o, i| {
-            let fresnel = first + (DVec3::ONE - first) * (1.0 - cosine(o, i)).powi(5);
-            fresnel * reference(o, i, wide)
-        });
+        check_values::<BrushedConductorRow>(
+            &format!("Schlick {alphas:?}"),
+            &schlick(alphas),
+            alphas,
+            |o, i| {
+                let fresnel = first + (DVec3::ONE - first) * (1.0 - cosine(o, i)).powi(5);
+                fresnel * reference(o, i, wide)
+            },
+        );
         let copper = of_element(Element::Copper, alphas);
-        check_values::<BrushedMetalRow>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
+        check_values::<BrushedConductorRow>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
             let fresnel = copper.fresnel.reflectance(cosine(o, i) as f32).as_dvec3();
             fresnel * reference(o, i, wide)
         });
@@ -42,25 +47,25 @@ fn values_are_those_of_the_formulas_and_reciprocal() {
 }
 
 #[test]
-fn a_surface_gets_the_bits_that_it_gets_alone() {
+fn lanes_are_independent() {
     let points =
         ALPHAS.into_iter().flat_map(|alpha| [schlick([alpha; 2]), of_element(Element::Iron, [alpha; 2])]);
-    check_neighbours::<RoundMetalRow>(&points.collect::<Vec<_>>());
+    check_neighbours::<IsotropicConductorRow>(&points.collect::<Vec<_>>());
     let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(Element::Iron, alphas));
-    check_neighbours::<BrushedMetalRow>(&points.collect::<Vec<_>>());
+    check_neighbours::<BrushedConductorRow>(&points.collect::<Vec<_>>());
 }
 
 #[test]
-fn rows_of_round_lobes_have_the_values_of_brushed_ones() {
+fn isotropic_packets_match_brushed_ones() {
     for alpha in ALPHAS {
         let (point, at) = (schlick([alpha; 2]), direction(0.6, 0.3));
-        let round = Subject::<RoundMetalRow>::new(&point, [alpha; 2], at);
-        let brushed = Subject::<BrushedMetalRow>::new(&point, [alpha; 2], at);
+        let round = Subject::<IsotropicConductorRow>::new(&point, [alpha; 2], at);
+        let brushed = Subject::<BrushedConductorRow>::new(&point, [alpha; 2], at);
         let (one, other) = (round.sampled_albedo(64), brushed.sampled_albedo(64));
         assert!((one - other).abs().max_element() < 1e-3, "α {alpha}: {one} and {other}");
         round.check_samples(&format!("α {alpha}"), LobeSet::All);
         let wide = [f64::from(alpha); 2];
-        check_values::<RoundMetalRow>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
+        check_values::<IsotropicConductorRow>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
             let first = DVec3::new(1.0, 0.78, 0.34);
             (first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5)) * reference(o, i, wide)
         });
@@ -68,22 +73,23 @@ fn rows_of_round_lobes_have_the_values_of_brushed_ones() {
 }
 
 #[test]
-fn samples_are_drawn_by_their_density() {
+fn samples_follow_the_pdf() {
     // 21 lobes in five directions.
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
-            let subject = Subject::<BrushedMetalRow>::new(&schlick(alphas), alphas, direction(cosine, 0.7));
+            let subject =
+                Subject::<BrushedConductorRow>::new(&schlick(alphas), alphas, direction(cosine, 0.7));
             subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), LobeSet::All);
         }
     }
 }
 
 #[test]
-fn samples_bring_the_albedo_that_quadrature_of_f_has_and_never_more_than_all() {
+fn sampled_albedos_match_quadrature() {
     for alphas in ALPHAS.into_iter().flat_map(shapes) {
         for cosine in COSINES {
             for point in [schlick(alphas), of_element(Element::Gold, alphas)] {
-                let subject = Subject::<BrushedMetalRow>::new(&point, alphas, direction(cosine, 0.3));
+                let subject = Subject::<BrushedConductorRow>::new(&point, alphas, direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} is not {exact}");
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
@@ -94,11 +100,11 @@ fn samples_bring_the_albedo_that_quadrature_of_f_has_and_never_more_than_all() {
 }
 
 #[test]
-fn a_narrow_lobe_reflects_as_a_mirror_does() {
+fn narrow_lobes_approach_a_mirror() {
     for element in Element::ALL {
         for cosine in [0.3, 0.7, 1.0] {
             let point = of_element(*element, [0.001; 2]);
-            let albedo = Subject::<BrushedMetalRow>::new(&point, [0.001; 2], direction(cosine, 0.0))
+            let albedo = Subject::<BrushedConductorRow>::new(&point, [0.001; 2], direction(cosine, 0.0))
                 .sampled_albedo(64);
             let mirror = point.fresnel.reflectance(cosine as f32).as_dvec3();
             assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo} is not {mirror}");
@@ -107,7 +113,7 @@ fn a_narrow_lobe_reflects_as_a_mirror_does() {
 }
 
 #[test]
-fn elements_have_their_colours() {
+fn elements_have_known_reflectances() {
     // Reflectance at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
     for (element, known) in [
         (Element::Gold, [0.968, 0.746, 0.372]),
@@ -124,8 +130,8 @@ fn elements_have_their_colours() {
 }
 
 #[test]
-fn anisotropy_stretches_as_the_formula_says() {
-    // α/a along u and α·a along v with a = √(1 − .9·|anisotropy|).
+fn anisotropy_stretches_alpha() {
+    // α/a along u and α·a along v, with a = √(1 − 0.9·|anisotropy|).
     let [u, v] = microfacet::alphas(0.5, 0.8);
     let a = (1.0_f32 - 0.72).sqrt();
     assert!((u - 0.25 / a).abs() < 1e-6 && (v - 0.25 * a).abs() < 1e-6);

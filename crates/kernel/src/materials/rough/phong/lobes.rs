@@ -1,6 +1,6 @@
-//! Directions drawn from the lobes of a Phong surface: the diffuse lobe by the cosine, the glossy one by cos^α about the
-//! mirrored direction to the viewer (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based
-//! Rendering*, 1994). A lobe is chosen by albedo; pdfs are those of both together.
+//! Sampling of a Phong surface's lobes: the diffuse lobe is cosine-weighted, the glossy one is distributed as cos
+//! α around the reflected view direction (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based
+//! Rendering*, 1994). Lobes are chosen by albedo; pdfs include both.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -8,12 +8,12 @@ use crate::math::Vec3;
 use crate::math::elementary::{pow_f64, sin_cos};
 use crate::math::frame::Frame;
 
-/// The lobes of a Phong surface at one point, for one direction to the viewer.
+/// The lobes of a Phong surface at one point, for one view direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobes {
     /// Unit normal on the viewer's side, for the cosine.
     pub normal: Vec3,
-    /// The direction to the viewer, mirrored at the normal.
+    /// The view direction, reflected at the normal.
     pub mirrored_eye: Vec3,
     /// The largest component of kd.
     pub diffuse: f32,
@@ -24,12 +24,14 @@ pub struct Lobes {
 }
 
 impl Lobes {
-    /// Samples a unit direction; `lobe` chooses the lobe and `u` the direction in it, all in [0, 1).
+    /// Samples a unit direction; `lobe` selects the lobe and `u` the direction within it, all in [0, 1).
     #[inline(always)]
     pub fn sample(&self, lobe: f32, u: [f32; 2]) -> Vec3 {
         let is_diffuse = lobe < self.diffuse_share();
         let rest = 1.0 - u[0];
-        // The cosine for cos^α is (1 − u)^1/(α + 1). In f64 its sine keeps the digits of narrow lobes.
+        // For cos
+        // α, the cosine is (1 − u)
+        // 1/(α + 1). Computing it in f64 keeps the sine of narrow lobes accurate.
         let cosine = pow_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt() as f32;
         let cosine = if is_diffuse { rest.sqrt() } else { cosine as f32 };
@@ -40,13 +42,13 @@ impl Lobes {
         about(Vec3::new(x, y, z), sine, cosine, u[1])
     }
 
-    /// [`Lobes::sample`] without a glossy lobe.
+    /// [`Lobes::sample`] with only the diffuse lobe.
     #[inline(always)]
     pub fn sample_diffuse(&self, u: [f32; 2]) -> Vec3 {
         about(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
     }
 
-    /// Pdf in sr⁻¹ of a direction among the samples, given its [`gloss`].
+    /// Pdf of a sampled direction in sr⁻¹, given its [`gloss`].
     #[inline(always)]
     pub fn density(&self, direction: Vec3, gloss: f32) -> f32 {
         let cosine = self.normal.dot(direction);
@@ -56,7 +58,7 @@ impl Lobes {
         share * diffuse + (1.0 - share) * glossy
     }
 
-    /// f in sr⁻¹ of a grey surface with these albedos.
+    /// f in sr⁻¹ of a gray surface with these albedos.
     #[inline(always)]
     pub fn value(&self, gloss: f32) -> f32 {
         self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
@@ -69,7 +71,7 @@ impl Lobes {
     }
 }
 
-/// A unit direction by its angle to an axis and a number in [0, 1) for the angle about it.
+/// A unit direction, from its angle to an axis and a number in [0, 1) for the angle around it.
 #[inline(always)]
 pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);
@@ -78,8 +80,9 @@ pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     direction * (1.0 / direction.length_squared().sqrt())
 }
 
-/// The glossy lobe's value in a direction, relative to its peak: the cosine between the direction and the mirrored viewer, to
-/// the power α; 0 behind. Uses the distance of their ends, whose digits the cosine of a small angle lacks.
+/// The glossy lobe's value in a direction, relative to its peak: the cosine between the direction and the reflected view
+/// direction, to the power α; 0 behind. The cosine is computed from the chord, because cos θ of a small angle θ
+/// loses precision in `f32`.
 #[inline(always)]
 pub fn gloss(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
     let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());

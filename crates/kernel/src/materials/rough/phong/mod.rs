@@ -1,5 +1,5 @@
-//! The normalised Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)^α (Lafortune and Willems, *Using the
-//! Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
+//! The normalized Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)
+//! α (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
 
 pub mod lobes;
 mod row;
@@ -23,11 +23,11 @@ pub struct Phong {
     pub specular: Color,
     /// Exponent α.
     pub shininess: f32,
-    /// Ambient reflectance ka. `None` stands for kd.
+    /// Ambient reflectance ka. `None` means kd.
     pub ambient: Option<Color>,
 }
 
-/// [`Phong`] at one point: its textures looked up.
+/// [`Phong`] at one point, with its textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhongBsdf {
     /// Diffuse reflectance kd.
@@ -54,13 +54,13 @@ impl RoughMaterial for Phong {
         }
     }
 
-    fn bleached(&self) -> PhongBsdf {
-        let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
+    fn with_white_textures(&self) -> PhongBsdf {
+        let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         PhongBsdf {
-            diffuse: bleached(&self.diffuse),
-            specular: bleached(&self.specular),
+            diffuse: with_white_textures(&self.diffuse),
+            specular: with_white_textures(&self.specular),
             shininess: self.shininess,
-            ambient: bleached(self.ambient.as_ref().unwrap_or(&self.diffuse)),
+            ambient: with_white_textures(self.ambient.as_ref().unwrap_or(&self.diffuse)),
         }
     }
 
@@ -129,7 +129,7 @@ impl PhongBsdf {
         self.diffuse_value() + self.specular_peak() * gloss
     }
 
-    /// Its lobes for a direction to the viewer, by the unit normal on that side.
+    /// Its lobes for a view direction, with the unit normal on that side.
     pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> Lobes {
         Lobes {
             normal,
@@ -166,8 +166,8 @@ mod tests {
     }
 
     #[test]
-    fn the_lobe_of_known_value() {
-        // (n + 2)/2π·cosⁿ 10° at n = 50, viewed 10° beside the mirrored direction.
+    fn glossy_lobe_of_known_value() {
+        // (n + 2)/2π·cosⁿ 10° at n = 50, viewed 10° away from the mirror direction.
         let value = reflected(50.0, at_angle(-30.0), at_angle(20.0));
         let expected = 52.0 / (2.0 * std::f64::consts::PI) * 10.0_f64.to_radians().cos().powi(50);
         assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");
@@ -186,12 +186,12 @@ mod tests {
                 sum += f64::from(reflected(shininess, at_angle(degrees), light));
             }
         }
-        // Equal steps of cos² weigh by the cosine: ∫f cos dω = π·mean(f).
+        // Equal steps of cos² are weighted by the cosine: ∫f cos dω = π·mean(f).
         sum / f64::from(rings * steps) * std::f64::consts::PI
     }
 
     #[test]
-    fn the_albedo_stays_below_one_and_has_its_known_values() {
+    fn albedos_match_known_values() {
         for (shininess, values) in
             [(10.0, [1.0, 0.8661, 0.5047, 0.2281]), (100.0, [1.0, 0.8660, 0.5000, 0.1752])]
         {

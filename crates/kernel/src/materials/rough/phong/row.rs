@@ -1,4 +1,4 @@
-//! Phong surfaces in rows of sixteen.
+//! Phong surfaces in packets of 16.
 
 use super::lobes::{Lobes, gloss};
 use super::{Phong, PhongBsdf};
@@ -10,18 +10,18 @@ use crate::math::lanes::{
     F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, set_lane,
 };
 
-/// Phong surfaces, side by side. The values of f that are shared are those of [`gloss`].
+/// A packet of Phong surfaces. The shared values of f are those of [`gloss`].
 #[derive(Clone, Debug)]
 pub struct PhongRow {
-    /// The direction to the viewer, mirrored.
+    /// The view direction, reflected at the normal.
     mirrored_eye: Vec3x16,
-    /// The diffuse part of f in sr⁻¹, as far as it is shown.
+    /// The diffuse part of f in sr⁻¹, 0 if it is not shown.
     diffuse: Vec3x16,
-    /// The glossy part of f in sr⁻¹ at its peak, as far as it is shown.
+    /// The glossy part of f in sr⁻¹ at its peak, 0 if it is not shown.
     specular: Vec3x16,
     /// Exponent of the glossy lobe.
     shininess: F32x16,
-    /// The largest components of kd and ks, whatever parts are shown.
+    /// The largest components of kd and ks, regardless of which parts are shown.
     albedos: [F32x16; 2],
     /// Whether any surface has a glossy lobe.
     is_glossy: bool,
@@ -40,7 +40,7 @@ impl PhongRow {
         }
     }
 
-    /// The glossy lobe of a surface alone.
+    /// Only the glossy lobe of a surface.
     #[inline(always)]
     fn glossy_lobe(&self, i: usize, normals: &Vec3x16) -> Lobes {
         Lobes { diffuse: 0.0, specular: 1.0, ..self.lobes(i, normals) }
@@ -72,7 +72,7 @@ impl PhongRow {
     }
 }
 
-/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, as far as they are shown.
+/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, each 0 if it is not shown.
 #[inline(always)]
 fn shown_parts(bsdf: &PhongBsdf, shown: ShownLobes) -> [Vec3; 2] {
     let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
@@ -84,7 +84,7 @@ fn shown_parts(bsdf: &PhongBsdf, shown: ShownLobes) -> [Vec3; 2] {
     }
 }
 
-/// A bit for each black colour.
+/// Mask of black colors.
 #[inline(always)]
 fn black(colors: &Vec3x16, simd: impl Simd) -> u32 {
     let mut black = [0; PACKET_SIZE];
@@ -165,10 +165,10 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> F32x16 {
+    fn max_component(&self, values: &BsdfValues) -> F32x16 {
         let mut grey = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
-            // The normal does not matter here.
+            // The normal is not used here.
             grey[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[0][i]);
         }
         grey
@@ -243,7 +243,7 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn even(&self, i: usize) -> Option<Vec3> {
+    fn constant_f(&self, i: usize) -> Option<Vec3> {
         (lane(&self.specular, i) == Vec3::ZERO).then(|| lane(&self.diffuse, i))
     }
 
@@ -299,7 +299,8 @@ impl MaterialRow for PhongRow {
     }
 }
 
-/// The direction to the viewer, mirrored: its cosine with a direction is that between the mirrored direction and the viewer's.
+/// The view direction, reflected at the normal: its cosine with a light direction equals that between the reflected light
+/// direction and the viewer.
 #[inline(always)]
 fn mirrored(normal: Vec3, to_eye: Vec3) -> Vec3 {
     // (2(n·l)n − l)·v = (2(n·v)n − v)·l.

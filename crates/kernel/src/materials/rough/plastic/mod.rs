@@ -1,7 +1,7 @@
-//! Plastic: a diffuse base under a dielectric coat of microfacets. What passes the coat on both ways, and what it returns to the base
-//! on the way, is in f = specular·F·D·G/(4 cosθᵢ cosθₒ) + (1 − E(μᵢ))(1 − E(μₒ))·kd/(π η² (1 − kd·F_dr)) with the coat's albedo E and
-//! F_dr = 1 − (1 − Ē)/η²: a white one reflects all light (Kulla and Conty, *Revisiting Physically Based Shading at Imageworks*,
-//! SIGGRAPH 2017 course, without the multiple scattering).
+//! Plastic: a diffuse base under a dielectric microfacet coat. With the coat's albedo E, its transmittance in both directions and
+//! the light that it reflects back to the base are included in f = specular·F·D·G/(4 cosθᵢ cosθₒ) + (1 − E(μᵢ))(1 − E(μₒ))·kd/(π
+//! η² (1 − kd·F_dr)), where F_dr = 1 − (1 − Ē)/η². White plastic reflects all light (Kulla and Conty, *Revisiting Physically
+//! Based Shading at Imageworks*, SIGGRAPH 2017 course, without the multiple scattering).
 
 mod row;
 
@@ -12,12 +12,12 @@ use crate::materials::bsdf::{RoughMaterial, RoughPoint};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo, dielectric, under_coat};
 use crate::materials::microfacet;
-use crate::materials::number::Number;
+use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::PlasticRow;
 
-/// A diffuse base under a coat. Under a smooth coat, this is the base alone; see [`crate::materials::Coated`].
+/// A diffuse base under a coat. If the coat is smooth, this is only the base; see [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
     diffuse: Color,
@@ -28,14 +28,14 @@ pub struct Plastic {
     albedos: AlbedoTable,
 }
 
-/// [`Plastic`] at one point: its textures looked up.
+/// [`Plastic`] at one point, with its textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlasticPoint {
     /// Diffuse reflectance kd.
     pub diffuse: Vec3,
-    /// f in sr⁻¹ of the base, for light that has passed the coat on both ways.
+    /// f of the base in sr⁻¹, for light that has passed the coat in both directions.
     pub base: Vec3,
-    /// Factor on the reflectance of the coat; 0 if the coat is smooth.
+    /// Factor on the coat's reflectance; 0 if the coat is smooth.
     pub specular: Vec3,
     /// Index of refraction.
     pub ior: f32,
@@ -46,7 +46,7 @@ pub struct PlasticPoint {
 }
 
 impl Plastic {
-    /// Plastic of kd, a factor on what its coat reflects, the root of α and the index of refraction, ≥ 1.
+    /// Plastic with the given kd, factor on the coat's reflection, square root of α, and index of refraction ≥ 1.
     pub fn new(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Self {
         let fresnel = |cosine: f64| dielectric(cosine, ior.into());
         let is_smooth = roughness.constant() == Some(0.0);
@@ -77,7 +77,7 @@ impl Plastic {
     }
 }
 
-/// f in sr⁻¹ of a base of this kd, for light that has passed the coat on both ways.
+/// f of a base with this kd in sr⁻¹, for light that has passed the coat in both directions.
 fn base(diffuse: Vec3, ior: f32, coat: &LobeAlbedo) -> Vec3 {
     let squared = ior * ior;
     let returned = 1.0 - (1.0 - coat.mean) / squared;
@@ -93,10 +93,10 @@ impl RoughMaterial for Plastic {
         self.point(diffuse, specular, self.roughness.at(at, lookups))
     }
 
-    fn bleached(&self) -> PlasticPoint {
-        let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
+    fn with_white_textures(&self) -> PlasticPoint {
+        let with_white_textures = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         let roughness = self.roughness.constant().unwrap_or(1.0);
-        self.point(bleached(&self.diffuse), bleached(&self.specular), roughness)
+        self.point(with_white_textures(&self.diffuse), with_white_textures(&self.specular), roughness)
     }
 
     #[inline]

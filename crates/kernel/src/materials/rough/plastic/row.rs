@@ -1,4 +1,4 @@
-//! Surfaces of plastic in rows of sixteen.
+//! Plastic in packets of 16.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -8,7 +8,7 @@ use crate::materials::bsdf::{
 };
 use crate::materials::fresnel::dielectric_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate, under_coat};
-use crate::materials::microfacet::{Half, Leg, facing_one, mirrored, turn_to_viewers};
+use crate::materials::microfacet::{Half, SmithTerms, facing_single, orient_to_viewers, sample_reflection};
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -16,8 +16,8 @@ use crate::math::lanes::{
     F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, set_lane,
 };
 
-/// Surfaces of plastic, side by side. The values of f that are shared are the grey f of all lobes, and what the coat lets through on
-/// both ways.
+/// A packet of plastic surfaces. The shared values of f are the largest component of f over all lobes, and the coat's
+/// transmittance in both directions.
 #[derive(Clone, Debug)]
 pub struct PlasticRow {
     /// Unit normals that face the viewer.
@@ -36,13 +36,13 @@ pub struct PlasticRow {
     terms: [F32x16; TERMS],
     /// Mean albedo of the coat.
     mean: F32x16,
-    /// Part of the light that the coat lets through on the way to the viewer.
+    /// Fraction of the light that the coat transmits on the way to the viewer.
     left: F32x16,
     /// Probability of choosing the coat's lobe.
     share: F32x16,
-    /// 1 where the diffuse lobe is shown, else 0; likewise the coat's.
+    /// 1 where the diffuse lobe is shown, otherwise 0; then the same for the coat's lobe.
     shown: [F32x16; 2],
-    /// f in sr⁻¹ that is shown in place of the lobes.
+    /// f in sr⁻¹ that is shown instead of the lobes.
     unit: F32x16,
     /// Whether any surface has a lobe of the coat.
     is_rough: bool,
@@ -50,7 +50,7 @@ pub struct PlasticRow {
     is_smooth: bool,
 }
 
-/// Factors on the diffuse lobe and the coat's for what is shown, and f in their place.
+/// Factors on the diffuse and the coat's lobe for the shown lobes, and f shown instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 3] {
     let part = |is_taken: bool| if is_taken { 1.0 } else { 0.0 };
@@ -61,7 +61,7 @@ fn shown_parts(shown: ShownLobes) -> [f32; 3] {
 }
 
 impl PlasticRow {
-    /// The albedo of a coat by a cosine ≥ 0.
+    /// Albedo of a coat at a cosine ≥ 0.
     #[inline(always)]
     fn albedo(&self, i: usize, cosine: f32) -> f32 {
         let rough = evaluate(cosine, |number| self.terms[number][i]);
@@ -73,7 +73,7 @@ impl PlasticRow {
         }
     }
 
-    /// Part of the light that the coat lets through on both ways, for a direction; 0 from behind.
+    /// The coat's transmittance in both directions; 0 from behind.
     #[inline(always)]
     fn through(&self, i: usize, direction: Vec3) -> f32 {
         let cosine = lane(&self.normal, i).dot(direction);
@@ -83,9 +83,9 @@ impl PlasticRow {
     }
 
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
+    fn legs(&self, i: usize, direction: Vec3) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
-        [lane(&self.to_eye, i), direction].map(|one| Leg::isotropic(normal, one, self.alpha[i]))
+        [lane(&self.to_eye, i), direction].map(|one| SmithTerms::isotropic(normal, one, self.alpha[i]))
     }
 
     /// D of the coat for a direction, and the reflectance of its facets.
@@ -106,7 +106,7 @@ impl PlasticRow {
         fresnel * eye.reflected(&light, distribution)
     }
 
-    /// Computes what depends on the direction to the viewer.
+    /// Updates the values that depend on the view direction.
     #[inline(always)]
     fn look(&mut self, i: usize) {
         let cosine = lane(&self.normal, i).dot(lane(&self.to_eye, i));
@@ -117,7 +117,7 @@ impl PlasticRow {
         self.share[i] = specular / (specular + diffuse).max(f32::MIN_POSITIVE);
     }
 
-    /// Sets what does not depend on directions, but for what is shown.
+    /// Sets the values that depend neither on directions nor on the shown lobes.
     #[inline(always)]
     fn set(&mut self, i: usize, bsdf: &PlasticPoint) {
         set_lane(&mut self.base, i, bsdf.base);
@@ -155,7 +155,7 @@ impl RoughRow for PlasticRow {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        facing_one(normal, to_eye)
+        facing_single(normal, to_eye)
     }
 
     #[inline(always)]
@@ -236,7 +236,7 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> F32x16 {
+    fn max_component(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
@@ -248,7 +248,7 @@ impl RoughRow for PlasticRow {
                 let direction = lane(directions, i);
                 let [distribution, _] = self.facets(i, direction);
                 let [eye, light] = self.legs(i, direction);
-                let density = eye.density(distribution);
+                let density = eye.pdf(distribution);
                 narrow[i] = if light.is_ahead() { density } else { 0.0 };
             }
         }
@@ -277,7 +277,7 @@ impl RoughRow for PlasticRow {
             for i in 0..PACKET_SIZE {
                 let (u, alpha) = ([u[0][i], u[1][i]], self.alpha[i]);
                 let frame = Frame::from_normal(lane(&self.normal, i));
-                let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
+                let narrow = sample_reflection(&frame, lane(&self.to_eye, i), [alpha; 2], u);
                 let is_narrow = match lobes {
                     LobeSet::All => choices[i] < self.share[i],
                     LobeSet::Narrow => alpha > 0.0,
@@ -318,7 +318,7 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn even(&self, _: usize) -> Option<Vec3> {
+    fn constant_f(&self, _: usize) -> Option<Vec3> {
         None
     }
 
@@ -344,7 +344,7 @@ impl MaterialRow for PlasticRow {
         shown: &[(u32, ShownLobes)],
         simd: impl Simd,
     ) -> u32 {
-        let point = material.constant().unwrap_or_else(|| material.bleached());
+        let point = material.constant().unwrap_or_else(|| material.with_white_textures());
         let mut bases =
             [[point.base.x; PACKET_SIZE], [point.base.y; PACKET_SIZE], [point.base.z; PACKET_SIZE]];
         if let (Some(texture), Some(uv)) = (material.row_texture(), uv) {
@@ -388,7 +388,7 @@ impl MaterialRow for PlasticRow {
 
     #[inline(always)]
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
-        turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
+        orient_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
         for i in 0..PACKET_SIZE {
             self.look(i);
         }

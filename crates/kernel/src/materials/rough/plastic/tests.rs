@@ -1,4 +1,4 @@
-//! Lobes of plastic: values against the formulas, samples against the pdf, and white plastic as a furnace.
+//! Tests of plastic: values against the formulas, samples against pdfs, and the white furnace test.
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
@@ -19,7 +19,7 @@ fn point(plastic: &Plastic) -> PlasticPoint {
 const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
 
 #[test]
-fn values_are_those_of_the_formulas_and_reciprocal() {
+fn values_match_the_formulas_and_are_reciprocal() {
     for (alpha, ior) in ALPHAS.into_iter().flat_map(|alpha| [(alpha, 1.5), (alpha, 1.2)]) {
         let point = point(&plastic(RED, 0.9, ior, alpha));
         let (eta, wide) = (f64::from(ior), [f64::from(alpha); 2]);
@@ -36,7 +36,7 @@ fn values_are_those_of_the_formulas_and_reciprocal() {
 }
 
 #[test]
-fn a_surface_gets_the_bits_that_it_gets_alone() {
+fn lanes_are_independent() {
     let points: Vec<PlasticPoint> = [0.0, 0.001, 0.05, 0.6]
         .into_iter()
         .flat_map(|alpha| [plastic(RED, 1.0, 1.5, alpha), plastic(Vec3::ZERO, 0.8, 1.3, alpha)])
@@ -46,7 +46,7 @@ fn a_surface_gets_the_bits_that_it_gets_alone() {
 }
 
 #[test]
-fn samples_are_drawn_by_their_density() {
+fn samples_follow_the_pdf() {
     for (alpha, cosine) in ALPHAS.into_iter().flat_map(|alpha| COSINES.map(|cosine| (alpha, cosine))) {
         let subject = Subject::<PlasticRow>::new(
             &point(&plastic(RED, 1.0, 1.5, alpha)),
@@ -54,7 +54,7 @@ fn samples_are_drawn_by_their_density() {
             direction(cosine, 0.7),
         );
         subject.check_samples(&format!("the coat of α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
-        // In the map of a narrow lobe, the cells of the diffuse one are too large.
+        // For a narrow lobe, the diffuse lobe's cells on the map are too large.
         if alpha >= 0.2 {
             subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), LobeSet::All);
         }
@@ -62,14 +62,14 @@ fn samples_are_drawn_by_their_density() {
 }
 
 #[test]
-fn white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has() {
+fn white_furnace_and_albedos_match_quadrature() {
     for (alpha, ior) in ALPHAS.into_iter().flat_map(|alpha| [1.0, 1.33, 1.5, 2.5].map(|ior| (alpha, ior))) {
         for cosine in COSINES {
             let what = format!("α {alpha}, η {ior} at a cosine of {cosine}");
             let white = point(&plastic(Vec3::ONE, 1.0, ior, alpha));
             let subject = Subject::<PlasticRow>::new(&white, [alpha; 2], direction(cosine, 0.3));
             let furnace = subject.sampled_albedo(192).x;
-            assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: a white one reflects {furnace}");
+            assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: white plastic reflects {furnace}");
             let red = point(&plastic(RED, 1.0, ior, alpha));
             let subject = Subject::<PlasticRow>::new(&red, [alpha; 2], direction(cosine, 0.3));
             let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
@@ -79,7 +79,7 @@ fn white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has() {
 }
 
 #[test]
-fn under_a_smooth_coat_the_base_has_what_fresnel_leaves() {
+fn smooth_coat_leaves_the_base_one_minus_fresnel() {
     for ior in [1.0, 1.3, 1.5, 3.0] {
         for cosine in COSINES {
             let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));

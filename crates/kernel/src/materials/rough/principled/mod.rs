@@ -1,12 +1,13 @@
-//! The principled material: glTF's inputs, on lobes of microfacets that keep to their energy.
+//! The principled material: glTF's parameters, with energy-conserving microfacet lobes.
 //!
-//! - Specular lobe: F is a mix, by `metallic`, of Schlick's approximation from `color`, and of that of a dielectric with
+//! - Specular lobe: F is a mix, by `metallic`, of Schlick's approximation from `color` and of a dielectric's with
 //!   F0 = min(((ior − 1)/(ior + 1))² · specular_color, 1) · specular and F90 = specular.
-//! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), with the albedo E of the dielectric
-//!   lobe.
-//! - Transmission of a thin sheet: the specular lobe, mirrored to the other side, (1 − metallic) · transmission · color · (1 − F) with
-//!   the dielectric's F. Surfaces that transmit are two vertices, as [`bsdf`](crate::materials::bsdf) says.
-//! - Clear coat c: everything below by (1 − c·E_c(μ)) for each of the two directions, and c times a lobe of F0 = .04.
+//! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), where E is the albedo of the
+//!   dielectric lobe.
+//! - Transmission of a thin sheet: the specular lobe, mirrored to the other side, times (1 − metallic) · transmission · color ·
+//!   (1 − F), with the dielectric's F. Transmissive surfaces are two vertices; see [`bsdf`](crate::materials::bsdf).
+//! - Clear coat c: a lobe with F0 = 0.04 times c; everything below is multiplied by (1 − c·E_c(μ)) for each of the two
+//!   directions.
 
 mod row;
 
@@ -17,83 +18,84 @@ use crate::materials::bsdf::{RoughMaterial, RoughPoint};
 use crate::materials::footprint::TexturePoint;
 use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo};
 use crate::materials::microfacet;
-use crate::materials::number::Number;
+use crate::materials::scalar::Number;
 use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::PrincipledRow;
 
-/// Reflectance of the clear coat at normal incidence: that of an index of refraction of 1.5.
+/// Reflectance of the clear coat at normal incidence, for an index of refraction of 1.5.
 const COAT_REFLECTANCE: f32 = 0.04;
 
 /// A principled material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Principled {
     inputs: PrincipledInputs,
-    /// The albedos of its lobes: of the specular one, and of the coat. `None` for those whose roughness changes.
+    /// Albedos of the specular lobe and of the coat. `None` for a lobe whose roughness varies.
     albedos: [Option<SchlickAlbedo>; 2],
 }
 
-/// The inputs of a principled material.
+/// The parameters of a principled material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrincipledInputs {
-    /// Diffuse reflectance, or that of the metal at normal incidence.
+    /// Diffuse reflectance, and the metal's reflectance at normal incidence.
     pub color: Color,
     /// Weight of the metal.
     pub metallic: Number,
-    /// The root of α.
+    /// The square root of α.
     pub roughness: Number,
     /// Index of refraction, ≥ 1.
     pub ior: f32,
-    /// Factor on the reflectance of what is no metal.
+    /// Factor on the reflectance of the dielectric part.
     pub specular: Number,
-    /// Factor on that reflectance at normal incidence.
+    /// Factor on its reflectance at normal incidence.
     pub specular_color: Color,
-    /// Part of the light below the dielectric that goes through in place of being scattered.
+    /// Fraction of the light below the dielectric that is transmitted instead of scattered.
     pub transmission: Number,
     /// Weight of the clear coat.
     pub clearcoat: Number,
-    /// The root of its α.
+    /// The square root of the clear coat's α.
     pub clearcoat_roughness: Number,
 }
 
-/// [`Principled`] at one point: its textures looked up.
+/// [`Principled`] at one point, with its textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrincipledPoint {
-    /// f in sr⁻¹ of the diffuse lobe, for light that has passed the lobes above it on both ways.
+    /// f of the diffuse lobe in sr⁻¹, for light that has passed the lobes above it in both directions.
     pub base: Vec3,
-    /// Reflectance at normal incidence of the specular lobe.
+    /// Reflectance of the specular lobe at normal incidence.
     pub facets: Vec3,
-    /// The part of that which is the metal's.
+    /// The metal's part of [`PrincipledPoint::facets`].
     pub metal: Vec3,
-    /// Its reflectance at grazing angles.
+    /// Reflectance of the specular lobe at grazing angles.
     pub grazing: f32,
-    /// The reflectances of the dielectric among it.
+    /// Reflectances of the dielectric part, at normal incidence and at grazing angles.
     pub dielectric: (Vec3, f32),
-    /// Factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ) for the light that goes through.
+    /// Factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ) for transmitted light.
     pub transmission: Vec3,
     /// α of the specular lobe.
     pub alpha: f32,
-    /// Albedos of the specular lobe by [`SchlickAlbedo`].
+    /// Albedos of the specular lobe.
     pub albedo: SchlickAlbedo,
     /// Weight of the clear coat.
     pub coat: f32,
-    /// Its α.
+    /// α of the clear coat.
     pub coat_alpha: f32,
-    /// Its albedo.
+    /// Albedo of the clear coat.
     pub coat_albedo: LobeAlbedo,
     /// Reflectance of ambient light.
     pub ambient: Vec3,
 }
 
 impl PrincipledPoint {
-    /// Whether any light goes through.
+    /// Whether any light is transmitted.
     #[inline]
     pub fn transmits(&self) -> bool {
         self.transmission != Vec3::ZERO
     }
 }
 
-/// Albedos of a lobe whose facets reflect 1 at normal incidence and 0 at grazing angles, and the reverse, by Schlick's approximation.
+/// Albedos of two lobes, with Schlick's approximation: one whose facets reflect 1 at normal incidence and 0 at grazing angles,
+/// and the reverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchlickAlbedo {
     /// The albedo per reflectance at normal incidence.
@@ -103,20 +105,20 @@ pub struct SchlickAlbedo {
 }
 
 impl SchlickAlbedo {
-    /// The albedos for one roughness.
+    /// The albedos for a constant roughness.
     fn of(roughness: f32) -> Self {
         let [normal, grazing] = tables(Some(roughness));
         Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
     }
 
-    /// The albedos for any roughness, by tables.
+    /// The albedos for any roughness, interpolated from tables.
     fn between(roughness: f32) -> Self {
         static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| tables(None));
         let [normal, grazing] = &*TABLES;
         Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
     }
 
-    /// The albedo of a coat of this reflectance at normal incidence, and 1 at grazing angles.
+    /// Albedo of a coat with this reflectance at normal incidence and 1 at grazing angles.
     fn of_coat(&self, reflectance: f32) -> LobeAlbedo {
         let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
         LobeAlbedo {
@@ -126,19 +128,19 @@ impl SchlickAlbedo {
     }
 }
 
-/// A clear coat over what emits.
+/// A clear coat over an emitting surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionCoat {
     /// Its weight.
     weight: Number,
-    /// The root of its α.
+    /// The square root of its α.
     roughness: Number,
-    /// Its albedo. `None` if the roughness changes.
+    /// Its albedo. `None` if the roughness varies.
     albedo: Option<LobeAlbedo>,
 }
 
 impl EmissionCoat {
-    /// The coat of this weight and roughness. `None` if it has no weight.
+    /// A coat of this weight and roughness. `None` if the weight is 0.
     pub fn new(weight: Number, roughness: Number) -> Option<Self> {
         if weight.constant() == Some(0.0) {
             return None;
@@ -147,7 +149,7 @@ impl EmissionCoat {
         Some(Self { weight, roughness, albedo })
     }
 
-    /// Part of the light that it lets through, by the cosine of the direction; adds to `lookups`.
+    /// Transmittance for light leaving at this cosine. Adds to `lookups`.
     pub fn left(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
         let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
         let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
@@ -175,7 +177,7 @@ fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     [normal, AlbedoTable::new(roughness, alpha, weight)]
 }
 
-/// The inputs at one point.
+/// The parameters at one point.
 #[derive(Clone, Copy)]
 struct Inputs {
     color: Vec3,
@@ -189,17 +191,17 @@ struct Inputs {
 }
 
 impl Principled {
-    /// Whether it may let light through.
-    pub fn lets_through(&self) -> bool {
+    /// Whether it may transmit light.
+    pub fn is_transmissive(&self) -> bool {
         self.inputs.transmission.constant() != Some(0.0)
     }
 
-    /// The material of these inputs.
+    /// A material with these parameters.
     pub fn new(inputs: PrincipledInputs) -> Self {
         let has_coat = inputs.clearcoat.constant() != Some(0.0);
         let coat = inputs.clearcoat_roughness.constant().filter(|_| has_coat);
         let albedos = [inputs.roughness.constant(), coat].map(|roughness| roughness.map(SchlickAlbedo::of));
-        // A coat without weight has any albedo.
+        // The albedo of a coat without weight is irrelevant.
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
@@ -253,7 +255,7 @@ impl RoughMaterial for Principled {
         self.point(&inputs)
     }
 
-    fn bleached(&self) -> PrincipledPoint {
+    fn with_white_textures(&self) -> PrincipledPoint {
         let color = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         let number = |number: &Number| number.constant().unwrap_or(1.0);
         self.point(&Inputs {
@@ -302,8 +304,8 @@ impl RoughMaterial for Principled {
 
     #[inline]
     fn fills_rows(&self) -> bool {
-        // A row has the light of one side.
-        !self.lets_through() && self.textures().next().is_none()
+        // Packets have light on one side only.
+        !self.is_transmissive() && self.textures().next().is_none()
     }
 
     #[inline]

@@ -1,4 +1,4 @@
-//! Surfaces of principled materials in rows of sixteen.
+//! Principled materials in packets of 16.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -8,23 +8,23 @@ use crate::materials::bsdf::{
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate};
-use crate::materials::microfacet::{Half, Leg, facing_one, mirrored, turn_to_viewers};
+use crate::materials::microfacet::{Half, SmithTerms, facing_single, orient_to_viewers, sample_reflection};
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
 
-/// Surfaces of principled materials, side by side: with light that they reflect, or that comes through. The values of f that are
-/// shared are the grey f of all lobes, and nothing.
+/// A packet of principled surfaces, for reflected or for transmitted light. The first shared value of f is the largest component
+/// of f over all lobes; the second is unused.
 #[derive(Clone, Debug)]
 pub struct PrincipledRow<const THROUGH: bool> {
-    /// Unit normals that face the viewer; for light that comes through, those on the other side.
+    /// Unit normals that face the viewer; for transmitted light, on the other side.
     normal: Vec3x16,
-    /// Unit directions to the viewer; for light that comes through, mirrored to the other side.
+    /// Unit directions to the viewer; for transmitted light, mirrored to the other side.
     to_eye: Vec3x16,
     /// [`PrincipledPoint::base`].
     base: Vec3x16,
-    /// The largest component of the diffuse lobe's albedo where nothing is above it.
+    /// The largest component of the diffuse lobe's albedo, without the lobes above it.
     diffuse: F32x16,
     /// [`PrincipledPoint::facets`].
     facets: Vec3x16,
@@ -44,27 +44,27 @@ pub struct PrincipledRow<const THROUGH: bool> {
     coat_alpha: F32x16,
     /// Terms of [`PrincipledPoint::coat_albedo`].
     coat_terms: [F32x16; TERMS],
-    /// Part of the light that the specular lobe leaves to the diffuse one on the way to the viewer.
+    /// Fraction of the light that the specular lobe leaves for the diffuse one on the way to the viewer.
     left: Vec3x16,
-    /// Part of the light that the coat lets through on the way to the viewer.
+    /// Fraction of the light that the coat transmits on the way to the viewer.
     through: F32x16,
     /// Probabilities of choosing the specular lobe, and the coat's.
     shares: [F32x16; 2],
-    /// Probability of choosing the light that comes through.
+    /// Probability of choosing transmission.
     through_share: F32x16,
-    /// 1 where the diffuse lobe is shown, else 0; likewise the others.
+    /// 1 where the diffuse lobe is shown, otherwise 0; then the same for the other lobes.
     shown: [F32x16; 2],
-    /// f in sr⁻¹ that is shown in place of the lobes.
+    /// f in sr⁻¹ that is shown instead of the lobes.
     unit: F32x16,
     /// Whether any surface has a clear coat.
     is_coated: bool,
     /// Whether any surface has a diffuse lobe.
     is_diffuse: bool,
-    /// Whether light comes through any surface.
+    /// Whether any surface transmits light.
     transmits: bool,
 }
 
-/// Values that depend on the direction to the viewer.
+/// Values that depend on the view direction.
 struct Seen {
     /// [`PrincipledRow::left`].
     left: Vec3,
@@ -76,7 +76,7 @@ struct Seen {
     through_share: f32,
 }
 
-/// Factors on the diffuse lobe and the others for what is shown, and f in their place.
+/// Factors on the diffuse lobe and on the others for the shown lobes, and f shown instead.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 3] {
     let part = |is_taken: bool| if is_taken { 1.0 } else { 0.0 };
@@ -86,50 +86,50 @@ fn shown_parts(shown: ShownLobes) -> [f32; 3] {
     }
 }
 
-/// A cosine, or 0 if it is negative.
+/// Clamps a cosine to at least 0.
 #[inline(always)]
 fn ahead(cosine: f32) -> f32 {
     if cosine > 0.0 { cosine } else { 0.0 }
 }
 
 impl<const THROUGH: bool> PrincipledRow<THROUGH> {
-    /// Albedo of the coat, with its weight, by a cosine ≥ 0.
+    /// Albedo of the coat, including its weight, at a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, i: usize, cosine: f32) -> f32 {
         self.coat[i] * evaluate(cosine, |number| self.coat_terms[number][i])
     }
 
-    /// Albedos of the specular lobe by its reflectances at normal incidence and at grazing angles, by a cosine ≥ 0.
+    /// Albedos of the specular lobe per unit of its reflectance at normal incidence and at grazing angles, at a cosine ≥ 0.
     #[inline(always)]
     fn albedos(&self, i: usize, cosine: f32) -> [f32; 2] {
-        // Not by `map`, which may stay a call and leave the loops around it scalar.
+        // Avoid `map`, which may not be inlined and would keep the surrounding loops scalar.
         let [normal, grazing] = &self.terms;
         [evaluate(cosine, |number| normal[number][i]), evaluate(cosine, |number| grazing[number][i])]
     }
 
-    /// Part of the light that the dielectric's specular lobe leaves, by a cosine ≥ 0.
+    /// Fraction of the light that the dielectric's specular lobe leaves, at a cosine ≥ 0.
     #[inline(always)]
     fn left_by_specular(&self, i: usize, cosine: f32) -> Vec3 {
         let [normal, grazing] = self.albedos(i, cosine);
         let (reflectance, of_grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
         let left = Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing);
-        // Facets that reflect all leave nothing, but for rounding.
+        // Fully reflective facets leave nothing; clamp the rounding error.
         Vec3::new(ahead(left.x), ahead(left.y), ahead(left.z))
     }
 
     #[inline(always)]
-    fn legs(&self, i: usize, direction: Vec3, alpha: f32) -> [Leg; 2] {
+    fn legs(&self, i: usize, direction: Vec3, alpha: f32) -> [SmithTerms; 2] {
         let normal = lane(&self.normal, i);
-        [lane(&self.to_eye, i), direction].map(|one| Leg::isotropic(normal, one, alpha))
+        [lane(&self.to_eye, i), direction].map(|one| SmithTerms::isotropic(normal, one, alpha))
     }
 
-    /// Part of the light that the coat lets through on both ways.
+    /// The coat's transmittance in both directions.
     #[inline(always)]
     fn through_coat(&self, i: usize, cosine: f32) -> f32 {
         if self.is_coated { self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine))) } else { 1.0 }
     }
 
-    /// The diffuse f; 0 from behind.
+    /// f of the diffuse lobe; 0 from behind.
     #[inline(always)]
     fn wide(&self, i: usize, direction: Vec3) -> Vec3 {
         let cosine = lane(&self.normal, i).dot(direction);
@@ -158,7 +158,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         }
     }
 
-    /// f of the light that comes through.
+    /// f of transmitted light.
     #[inline(always)]
     fn transmitted(&self, i: usize, direction: Vec3) -> Vec3 {
         let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
@@ -170,19 +170,19 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         lane(&self.transmission, i) * left * (white * self.through_coat(i, light.cosine))
     }
 
-    /// Pdfs of a direction in the specular lobe and in the coat's.
+    /// Pdfs of a direction in the specular and in the coat's lobe.
     #[inline(always)]
     fn densities(&self, i: usize, direction: Vec3) -> [f32; 2] {
         let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
         let of = |alpha: f32| {
             let [eye, light] = self.legs(i, direction, alpha);
-            let density = eye.density(half.isotropic(alpha));
+            let density = eye.pdf(half.isotropic(alpha));
             if light.is_ahead() { density } else { 0.0 }
         };
         [of(self.alpha[i]), if self.is_coated { of(self.coat_alpha[i]) } else { 0.0 }]
     }
 
-    /// Computes what depends on the direction to the viewer.
+    /// Computes the values that depend on the view direction.
     #[inline(always)]
     fn seen(&self, i: usize) -> Seen {
         let cosine = ahead(lane(&self.normal, i).dot(lane(&self.to_eye, i)));
@@ -199,7 +199,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
             all += through;
         }
         let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
-        // The coat has at least its part of the light, and the rest shares what passes it.
+        // The coat gets at least its fraction of the light; the rest is split among the lobes below.
         let of_coat = if self.coat[i] > 0.0 { 1.0 - below * all } else { 0.0 };
         Seen {
             left,
@@ -217,10 +217,10 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         [self.shares[0][i], self.shares[1][i]] = seen.shares;
     }
 
-    /// [`Self::look`] for all surfaces.
+    /// Updates all surfaces.
     #[inline(always)]
     fn look_all(&mut self) {
-        // The loop writes to arrays apart from those that it reads: otherwise it stays scalar.
+        // Write to arrays other than those being read: otherwise, the loop is not vectorized.
         let (mut left, mut shares) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 2]);
         let (mut through, mut through_share) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
@@ -265,7 +265,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        if THROUGH { -facing_one(-normal, to_eye) } else { facing_one(normal, to_eye) }
+        if THROUGH { -facing_single(-normal, to_eye) } else { facing_single(normal, to_eye) }
     }
 
     #[inline(always)]
@@ -372,7 +372,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> F32x16 {
+    fn max_component(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
@@ -409,7 +409,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
                 LobeSet::All => choices[i],
                 LobeSet::Narrow => choices[i] * (of_specular + of_coat + of_through),
             };
-            // The coat comes first, then the specular lobe; what goes through comes last.
+            // The coat comes first, then the specular lobe; transmission comes last.
             let last = match lobes {
                 LobeSet::All => 1.0 - of_through,
                 LobeSet::Narrow => of_specular + of_coat,
@@ -421,13 +421,13 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
                 LobeSet::Narrow => false,
             };
             let frame = Frame::from_normal(lane(&self.normal, i));
-            let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
+            let narrow = sample_reflection(&frame, lane(&self.to_eye, i), [alpha; 2], u);
             let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
             let is_wide = is_wide & !THROUGH;
             let choose = |wide: f32, narrow: f32| if is_wide { wide } else { narrow };
             let chosen =
                 Vec3::new(choose(wide.x, narrow.x), choose(wide.y, narrow.y), choose(wide.z, narrow.z));
-            // Where it goes on at the other side, the direction is of no use.
+            // If the path continues on the other side, this direction is unused.
             let useless = -lane(&self.normal, i);
             let keep = |own: f32, useless: f32| if is_through == THROUGH { own } else { useless };
             let kept =
@@ -461,7 +461,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn even(&self, _: usize) -> Option<Vec3> {
+    fn constant_f(&self, _: usize) -> Option<Vec3> {
         None
     }
 
@@ -487,7 +487,7 @@ impl MaterialRow for PrincipledRow<false> {
         shown: &[(u32, ShownLobes)],
         _: impl Simd,
     ) -> u32 {
-        let point = material.constant().unwrap_or_else(|| material.bleached());
+        let point = material.constant().unwrap_or_else(|| material.with_white_textures());
         for &(of, shown) in shown {
             let (of, [diffuse, specular, unit]) = (mask_from_bits(of), shown_parts(shown));
             for axis in 0..3 {
@@ -521,7 +521,7 @@ impl MaterialRow for PrincipledRow<false> {
 
     #[inline(always)]
     fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
-        turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
+        orient_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
         self.look_all();
     }
 }

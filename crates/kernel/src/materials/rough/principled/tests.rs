@@ -1,9 +1,9 @@
-//! Lobes of principled materials: values against the formulas, samples against the pdf, and albedos of at most 1.
+//! Tests of principled lobes: values against the formulas, samples against pdfs, and albedos of at most 1.
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, Light, Subject, check_neighbours, check_neighbours_lit, check_values, direction,
+    ALPHAS, COSINES, LitFrom, Subject, check_neighbours, check_neighbours_lit, check_values, direction,
     reference,
 };
 use crate::math::DVec3;
@@ -35,14 +35,14 @@ const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
 
 fn subjects() -> impl Iterator<Item = (f32, f32, [f32; 2])> {
     ALPHAS.into_iter().flat_map(|alpha| {
-        // A coat of another roughness, so that samples of one lobe do not pass for those of the other.
+        // The coat has a different roughness, so that samples of one lobe cannot pass for the other's.
         [(0.0, [0.0, 0.0]), (0.4, [0.6, 0.7 * alpha]), (1.0, [0.0, 0.0])]
             .map(|(metallic, coat)| (alpha, metallic, coat))
     })
 }
 
 #[test]
-fn values_are_those_of_the_formulas_and_reciprocal() {
+fn values_match_the_formulas_and_are_reciprocal() {
     for (alpha, metallic, coat) in subjects() {
         let point = point(&principled(RED, metallic, alpha, coat));
         // F0 = min(((ior − 1)/(ior + 1))²·specular_color, 1)·specular.
@@ -79,7 +79,7 @@ fn values_are_those_of_the_formulas_and_reciprocal() {
 }
 
 #[test]
-fn a_surface_gets_the_bits_that_it_gets_alone() {
+fn lanes_are_independent() {
     let points: Vec<PrincipledPoint> = subjects()
         .flat_map(|(alpha, metallic, coat)| {
             [RED, Vec3::ZERO].map(|color| principled(color, metallic, alpha, coat))
@@ -90,7 +90,7 @@ fn a_surface_gets_the_bits_that_it_gets_alone() {
 }
 
 #[test]
-fn samples_are_drawn_by_their_density() {
+fn samples_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects() {
         for cosine in COSINES {
             let point = point(&principled(RED, metallic, alpha, coat));
@@ -105,7 +105,7 @@ fn samples_are_drawn_by_their_density() {
 }
 
 #[test]
-fn albedos_are_those_of_quadrature_and_never_above_one() {
+fn albedos_match_quadrature_and_stay_below_1() {
     for (alpha, metallic, coat) in subjects() {
         for cosine in COSINES {
             for color in [RED, Vec3::ONE] {
@@ -124,7 +124,7 @@ fn albedos_are_those_of_quadrature_and_never_above_one() {
 }
 
 #[test]
-fn where_facets_reflect_all_samples_weigh_no_more_than_grazing_light_needs() {
+fn fully_reflective_facets_have_bounded_weights() {
     for alpha in [0.001_f32, 0.002, 0.01, 0.05] {
         let number = Number::Constant;
         let white = Principled::new(PrincipledInputs {
@@ -148,11 +148,11 @@ fn where_facets_reflect_all_samples_weigh_no_more_than_grazing_light_needs() {
     }
 }
 
-/// Parts of the light that go through.
+/// Fractions of transmitted light to test.
 const TRANSMISSIONS: [f32; 2] = [0.6, 1.0];
 
 #[test]
-fn what_goes_through_is_the_lobe_mirrored_to_the_other_side() {
+fn transmission_is_the_mirrored_lobe() {
     for ((alpha, metallic, coat), transmission) in
         subjects().filter(|one| one.1 < 1.0).flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
     {
@@ -163,7 +163,7 @@ fn what_goes_through_is_the_lobe_mirrored_to_the_other_side() {
         let (part, m) = (f64::from(transmission), f64::from(metallic));
         for (number, cosine) in COSINES.into_iter().enumerate() {
             let to_eye = direction(cosine, 0.7).as_vec3().as_dvec3();
-            let subject = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], to_eye, Light::Through);
+            let subject = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], to_eye, LitFrom::Through);
             for trial in 0..40_u32 {
                 let (y, turn) = (f64::from(trial) / 41.0, f64::from(trial) * 2.4 + number as f64);
                 let Some((light, _)) = subject.at_half_vector(y, turn) else { continue };
@@ -186,12 +186,12 @@ fn what_goes_through_is_the_lobe_mirrored_to_the_other_side() {
 }
 
 #[test]
-fn samples_of_both_sides_are_drawn_by_their_density() {
+fn samples_of_both_sides_follow_the_pdf() {
     for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
         for cosine in COSINES {
             let point = point(&transmitting(RED, metallic, 0.6, alpha, coat));
             let at = direction(cosine, 0.7);
-            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, Light::Through);
+            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
             let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             for lobes in [LobeSet::Narrow, LobeSet::All] {
@@ -205,14 +205,14 @@ fn samples_of_both_sides_are_drawn_by_their_density() {
 }
 
 #[test]
-fn both_sides_together_have_the_albedo_of_quadrature_and_never_more_than_all() {
+fn two_sided_albedos_match_quadrature() {
     for ((alpha, metallic, coat), transmission) in
         subjects().flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
     {
         for cosine in COSINES {
             let point = point(&transmitting(Vec3::ONE, metallic, transmission, alpha, coat));
             let at = direction(cosine, 0.3);
-            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, Light::Through);
+            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, LitFrom::Through);
             let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
             let sampled = front.sampled_albedo(192) + behind.sampled_albedo(192);
             let exact = front.albedo() + behind.albedo();
@@ -225,7 +225,7 @@ fn both_sides_together_have_the_albedo_of_quadrature_and_never_more_than_all() {
 }
 
 #[test]
-fn a_surface_that_light_goes_through_gets_the_bits_that_it_gets_alone() {
+fn transmissive_lanes_are_independent() {
     let points: Vec<PrincipledPoint> = subjects()
         .flat_map(|(alpha, metallic, coat)| {
             [0.0, 0.6, 1.0].map(|part| transmitting(RED, metallic, part, alpha, coat))
@@ -233,5 +233,5 @@ fn a_surface_that_light_goes_through_gets_the_bits_that_it_gets_alone() {
         .map(|one| point(&one))
         .collect();
     check_neighbours::<PrincipledRow<false>>(&points);
-    check_neighbours_lit::<PrincipledRow<true>>(&points, Light::Through);
+    check_neighbours_lit::<PrincipledRow<true>>(&points, LitFrom::Through);
 }

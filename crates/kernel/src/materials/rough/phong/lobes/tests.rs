@@ -1,4 +1,4 @@
-//! Samples of directions against pdfs, and their mean against known albedos.
+//! Tests of samples against pdfs, and of their means against known albedos.
 
 use super::*;
 use crate::materials::phong::PhongBsdf;
@@ -9,7 +9,7 @@ fn bsdf(diffuse: f32, specular: f32, shininess: f32) -> PhongBsdf {
     PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO }
 }
 
-/// Unit normals, one beside the pole of a frame.
+/// Unit normals, one of them near a frame's pole.
 fn normals() -> [Vec3; 3] {
     [Vec3::Z, Vec3::new(3.85e-4, 3.85e-4, -0.999_999_9).normalize(), Vec3::new(0.6, -0.48, 0.64)]
 }
@@ -28,7 +28,7 @@ fn sample(lobes: &Lobes, next: &mut impl FnMut() -> f32) -> Vec3 {
     lobes.sample(lobe, [next(), next()])
 }
 
-/// Compares counts by χ²: at most six standard deviations above its mean, a probability of 1e-9.
+/// χ² test of counts: at most six standard deviations above the mean, a probability of 1e-9.
 fn assert_counts(what: &str, counts: &[u32], expected: &[f64]) {
     let (mut sum, mut cells, mut rest) = (0.0, 0, [0.0; 2]);
     for (count, expected) in counts.iter().zip(expected) {
@@ -50,7 +50,7 @@ fn assert_counts(what: &str, counts: &[u32], expected: &[f64]) {
 }
 
 #[test]
-fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
+fn glossy_samples_follow_the_pdf() {
     let mut next = random(7);
     for normal in normals() {
         for shininess in [0.0_f32, 1.0, 4.5, 30.0, 1e3, 1e4, 1e5] {
@@ -63,7 +63,8 @@ fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
                     let direction = sample(&lobes, &mut next);
                     let offset = (direction - lobes.mirrored_eye).as_dvec3();
                     let cosine = 1.0 - 0.5 * offset.length_squared();
-                    // Uniform in cos^(α + 1) and in the angle about the axis.
+                    // cos
+                    // (α + 1) and the azimuth are uniform.
                     let power = libm::pow(cosine.max(0.0), n - 1.0);
                     let ring = (power * cosine * 16.0) as usize;
                     let phi = frame.t.dot(direction).atan2(frame.s.dot(direction)) / (2.0 * PI) + 0.5;
@@ -85,7 +86,7 @@ fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
 const RINGS: usize = 24;
 const STEPS: usize = 24;
 
-/// The integral of the pdf over each cell of equal solid angle on the sphere.
+/// Integral of the pdf over each of the equal-area cells on the sphere.
 fn integrals(lobes: &Lobes) -> Vec<f64> {
     const FINE: usize = 24;
     let cell = |ring: usize, step: usize| {
@@ -105,7 +106,7 @@ fn integrals(lobes: &Lobes) -> Vec<f64> {
 }
 
 #[test]
-fn both_lobes_together_are_drawn_by_their_density() {
+fn combined_lobe_samples_follow_the_pdf() {
     let mut next = random(11);
     for normal in normals() {
         for (diffuse, specular, shininess) in
@@ -116,7 +117,7 @@ fn both_lobes_together_are_drawn_by_their_density() {
                 let integrals = integrals(&lobes);
                 let what = format!("{diffuse}, {specular}, α {shininess} at {degrees}° from {normal}");
                 let whole = integrals.iter().sum::<f64>();
-                assert!((whole - 1.0).abs() < 2e-3, "{what}: the density integrates to {whole}");
+                assert!((whole - 1.0).abs() < 2e-3, "{what}: the pdf integrates to {whole}");
                 let mut counts = vec![0; RINGS * STEPS];
                 for _ in 0..SAMPLES {
                     let direction = sample(&lobes, &mut next);
@@ -133,7 +134,7 @@ fn both_lobes_together_are_drawn_by_their_density() {
     }
 }
 
-/// Mean of f·cos/pdf over the samples: the albedo.
+/// Albedo: the mean of f·cos/pdf over samples.
 fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
     let (mut next, normal) = (random(3), normals()[2]);
     let lobes = bsdf.lobes(normal, at_angle(normal, degrees));
@@ -148,7 +149,7 @@ fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
 }
 
 #[test]
-fn samples_bring_the_known_albedos_and_never_more_than_all() {
+fn sampled_albedos_match_known_values() {
     // (n + 2)/2π ∫cosⁿα cosθ dω.
     for (shininess, known) in [(10.0, [1.0, 0.8661, 0.5047, 0.2281]), (100.0, [1.0, 0.8660, 0.5, 0.1752])] {
         for (degrees, known) in [0.0, 30.0, 60.0, 80.0].into_iter().zip(known) {
@@ -158,7 +159,7 @@ fn samples_bring_the_known_albedos_and_never_more_than_all() {
             assert!((both - 0.4 - 0.6 * known).abs() < 4e-3, "with a diffuse part: {both}");
         }
     }
-    // In the limit of narrow lobes the albedo is cosθ: the mirrored direction counts as that of a lamp does.
+    // In the limit of narrow lobes, the albedo is cosθ.
     for degrees in [0.0_f32, 45.0, 80.0, 89.0] {
         let found = albedo(&bsdf(0.0, 1.0, 1e5), degrees);
         let known = f64::from(degrees.to_radians().cos());
@@ -167,7 +168,7 @@ fn samples_bring_the_known_albedos_and_never_more_than_all() {
 }
 
 #[test]
-fn light_and_eye_may_change_places() {
+fn values_are_reciprocal() {
     let mut next = random(5);
     for shininess in [1.0, 20.0, 1e4] {
         let bsdf = bsdf(0.3, 0.6, shininess);

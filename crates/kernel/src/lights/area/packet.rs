@@ -1,0 +1,84 @@
+//! Samples of one area light for a packet of points.
+
+use super::sample_point::LightSamplePoint;
+use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
+use crate::lights::packet::{LightSamplePacket, packet_of};
+use crate::lights::sample::LightObject;
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
+
+/// Samples area-sampled triangles for a packet, with a light per lane.
+macro_rules! triangle_packet_of {
+    ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
+        let mut row = packet_of!(LightObject::Nothing, $i => {
+            let sample: LightSamplePoint = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+            (sample.direction, sample.target, $light.radiance * sample.factor)
+        });
+        for $i in 0..PACKET_SIZE {
+            let source = LightObject::Primitive($light.object, $facets.part($u[0][$i]));
+            row.sources.set($i, source);
+        }
+        row
+    }};
+}
+
+pub(in crate::lights) use triangle_packet_of;
+
+impl AreaLight {
+    /// [`AreaLight::sample_untextured`] for the points in mask `used`.
+    #[inline(always)]
+    pub fn sample_row(
+        &self,
+        points: &Vec3x16,
+        normals: &Vec3x16,
+        used: u32,
+        u: &[F32x16; 2],
+    ) -> LightSamplePacket {
+        let source = self.source();
+        macro_rules! packet_from {
+            ($emitter:expr) => {
+                packet_of!(source, i => {
+                    let sample: LightSamplePoint = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    (sample.direction, sample.target, self.radiance * sample.factor)
+                })
+            };
+        }
+        // All quads share one loop, because compilers do not vectorize a second one.
+        if let Some((quad, of_two)) = self.shape.as_quad() {
+            // Compute the differences, which need double precision, separately: otherwise, the other operations would be done
+            // only eight at a time.
+            let mut offsets = [[0.0; PACKET_SIZE]; 3];
+            for i in 0..PACKET_SIZE {
+                set_lane(&mut offsets, i, quad.corner_from(lane(points, i)));
+            }
+            let mut row = packet_of!(source, i => {
+                let sample = quad.sample_from(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);
+                (sample.direction, sample.target, self.radiance * sample.factor)
+            });
+            if let Some(two) = of_two {
+                for i in 0..PACKET_SIZE {
+                    row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                }
+            }
+            return row;
+        }
+        if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::facets) {
+            return triangle_packet_of!(i => (facets, self), points, u);
+        }
+        if let Emitter::TexturedQuad(picture) = &self.shape {
+            return packet_from!(picture);
+        }
+        if let Emitter::Sphere(sphere) = &self.shape {
+            return packet_from!(sphere);
+        }
+        if let Emitter::Disk(disk) = &self.shape {
+            return packet_from!(disk);
+        }
+        if let Emitter::Box(cuboid) = &self.shape {
+            return packet_from!(cuboid);
+        }
+        // Other shapes have no vectorized loop.
+        LightSamplePacket::lane_by_lane(points, used, |i, point| {
+            self.sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
+        })
+    }
+}

@@ -1,0 +1,51 @@
+//! One side of a see-through round shape or box: surfaces behind the near side are visible through it.
+
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter, Side};
+use crate::geometry::{AreaPoint, Shape};
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::distribution::Discrete;
+
+/// One side of a shape, sampled by area. Shadow rays account for the parts of the shape in between.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeeThroughEmitter {
+    shape: Shape,
+    by_area: Discrete,
+    /// 1 for the front, −1 for the back.
+    outwards: f64,
+}
+
+impl SeeThroughEmitter {
+    /// The emitter of one side of a shape. `None` if the shape has no area.
+    pub fn new(shape: &Shape, side: Side) -> Option<Self> {
+        let outwards = match side {
+            Side::Front => 1.0,
+            Side::Back => -1.0,
+        };
+        Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())?, outwards })
+    }
+}
+
+impl ShapeEmitter for SeeThroughEmitter {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let (part, rest) = self.by_area.sample(u[0]);
+        let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
+        let offset = place - point.as_dvec3();
+        let distance = offset.length();
+        let cosine = -self.outwards * normal.dot(offset) / distance;
+        if !(cosine > 0.0) {
+            return LightSamplePoint::NOTHING;
+        }
+        let direction = (offset / distance).as_vec3();
+        let factor = cosine * self.by_area.total() / (distance * distance);
+        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+    }
+
+    fn pdf(&self, _: Vec3, met: &LightHit) -> f32 {
+        met.pdf_by_area(self.by_area.total())
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.shape.centroid()
+    }
+}

@@ -1,0 +1,314 @@
+//! Cylinder and cone lights: a curved side with caps.
+
+use super::disk::{DiskEmitter, perpendicular};
+use super::meridians::{MeridianDistribution, PolarFrame, SinCos};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
+use crate::geometry::cone::Cone;
+use crate::geometry::cylinder::Cylinder;
+use crate::math::{DVec3, Vec3};
+
+/// A curved side and its caps, at most one of which is visible from any point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RevolutionEmitter<S> {
+    side: S,
+    caps: [Option<DiskEmitter>; 2],
+    middle: DVec3,
+}
+
+/// The curved side of a light, which intersects each half plane around a pole in one interval.
+pub trait RevolutionSide {
+    /// The side seen from a point.
+    type RevolutionView: RevolutionSideView;
+
+    /// The side seen from a point. `None` if the point is behind it.
+    fn seen_from(&self, point: Vec3) -> Option<Self::RevolutionView>;
+}
+
+/// A curved side seen from a point.
+pub trait RevolutionSideView {
+    /// The pole around which the half planes rotate.
+    fn pole(&self) -> &PolarFrame;
+
+    /// The largest angle around the pole at which the side is visible.
+    fn reach(&self) -> SinCos;
+
+    /// Difference of the cosines at the ends of the visible interval, at an angle around the pole.
+    fn stretch(&self, around: SinCos) -> f64;
+
+    /// The point of the interval at a fraction `share` of its cosines: its angle from the pole, and its distance.
+    fn place(&self, around: SinCos, share: f64) -> (SinCos, f64);
+}
+
+/// The visible part of a light.
+struct RevolutionView<V> {
+    side: Option<(V, MeridianDistribution)>,
+    cap: Option<(super::disk::DiskView, DVec3)>,
+    /// Fraction of samples on the side.
+    share: f64,
+}
+
+impl<S: RevolutionSide> ShapeEmitter for RevolutionEmitter<S> {
+    /// Samples by solid angle, uniformly except for variations between meridians and the 20 % of a cap.
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let view = self.view(point);
+        let share = view.share as f32;
+        let (direction, distance, factor) = match (view.side, view.cap) {
+            (Some((side, meridians)), _) if u[0] < share => {
+                let (angle, density) = meridians.sample(u[1]);
+                let around = SinCos::of(angle);
+                let (from_pole, distance) = side.place(around, f64::from(u[0] / share));
+                let factor = side.stretch(around) / (density * f64::from(share));
+                (side.pole().direction(from_pole, around), distance, factor)
+            }
+            (_, Some((cap, normal))) => {
+                let rest = (u[0] - share) / (1.0 - share);
+                let (direction, distance, factor) = cap.sample(normal, [rest.min(1.0_f32.next_down()), u[1]]);
+                (direction, distance, factor / f64::from(1.0 - share))
+            }
+            (_, None) => return LightSamplePoint::NOTHING,
+        };
+        let direction = direction.as_vec3();
+        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+    }
+
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+        let view = self.view(from);
+        let share = f64::from(view.share as f32);
+        let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
+        let density = match (view.side, view.cap) {
+            (_, Some((cap, normal))) if is_cap(normal) => (1.0 - share) * cap.pdf(met.direction),
+            (Some((side, meridians)), _) => {
+                let angle = side.pole().around(met.direction);
+                share * meridians.pdf(angle) / side.stretch(SinCos::of(angle.abs()))
+            }
+            (None, _) => 0.0,
+        };
+        density as f32
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.middle
+    }
+}
+
+impl<S: RevolutionSide> RevolutionEmitter<S> {
+    fn view(&self, point: Vec3) -> RevolutionView<S::RevolutionView> {
+        let side = self.side.seen_from(point).map(|view| {
+            let meridians = MeridianDistribution::new(view.reach(), |turn| view.stretch(turn));
+            (view, meridians)
+        });
+        let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
+        let caps = self.caps.iter().flatten().map(|cap| (cap.seen_from(point), cap.normal()));
+        let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
+        let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
+        let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle());
+        let share = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
+        RevolutionView { side, cap, share }
+    }
+}
+
+/// The curved side of a cylinder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CylinderSide {
+    middle: DVec3,
+    /// Unit vector along the cylinder.
+    axis: DVec3,
+    half_length: f64,
+    radius: f64,
+}
+
+/// A cylinder seen from a point. The pole is parallel to the axis; the half planes are at the angles of the cross-section circle.
+pub struct CylinderView {
+    pole: PolarFrame,
+    reach: SinCos,
+    radius: f64,
+    /// Distance from the axis.
+    distance: f64,
+    /// distance² − radius².
+    power: f64,
+    /// Heights of the ends above the point.
+    ends: [f64; 2],
+}
+
+impl RevolutionEmitter<CylinderSide> {
+    /// The emitter of an entire cylinder.
+    pub fn of_cylinder(cylinder: &Cylinder) -> Self {
+        let caps = [1, 2].map(|number| cylinder.cap(number));
+        let across = caps[1].centroid() - caps[0].centroid();
+        let side = CylinderSide {
+            middle: cylinder.centroid(),
+            axis: caps[1].normal(),
+            half_length: across.length() * 0.5,
+            radius: caps[0].radius(),
+        };
+        let caps = caps.map(|cap| cylinder.is_capped().then(|| DiskEmitter::new(&cap)));
+        Self { side, caps, middle: cylinder.centroid() }
+    }
+}
+
+impl RevolutionSide for CylinderSide {
+    type RevolutionView = CylinderView;
+
+    fn seen_from(&self, point: Vec3) -> Option<CylinderView> {
+        let to_middle = self.middle - point.as_dvec3();
+        let height = to_middle.dot(self.axis);
+        let across = to_middle - self.axis * height;
+        let distance = across.length();
+        let power = (distance - self.radius) * (distance + self.radius);
+        (power > 0.0).then(|| CylinderView {
+            pole: PolarFrame::new(self.axis, across / distance),
+            reach: SinCos { sin: self.radius / distance, cos: power.sqrt() / distance },
+            radius: self.radius,
+            distance,
+            power,
+            ends: [height - self.half_length, height + self.half_length],
+        })
+    }
+}
+
+impl CylinderView {
+    /// Distance to the cross-section circle, without cancellation.
+    fn to_circle(&self, around: SinCos) -> f64 {
+        let off = self.distance * around.sin;
+        let half_chord = ((self.radius - off) * (self.radius + off)).max(0.0).sqrt();
+        self.power / (self.distance * around.cos + half_chord)
+    }
+
+    fn cosines(&self, to_circle: f64) -> [f64; 2] {
+        self.ends.map(|end| end / (to_circle * to_circle + end * end).sqrt())
+    }
+}
+
+impl RevolutionSideView for CylinderView {
+    fn pole(&self) -> &PolarFrame {
+        &self.pole
+    }
+
+    fn reach(&self) -> SinCos {
+        self.reach
+    }
+
+    fn stretch(&self, around: SinCos) -> f64 {
+        let [low, high] = self.cosines(self.to_circle(SinCos { sin: around.sin.abs(), ..around }));
+        high - low
+    }
+
+    fn place(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+        let to_circle = self.to_circle(SinCos { sin: around.sin.abs(), ..around });
+        let [low, high] = self.cosines(to_circle);
+        let cos = low + (high - low) * share;
+        let height = to_circle * cos / ((1.0 - cos) * (1.0 + cos)).max(f64::MIN_POSITIVE).sqrt();
+        let height = height.clamp(self.ends[0], self.ends[1]);
+        let distance = (to_circle * to_circle + height * height).sqrt();
+        (SinCos { sin: to_circle / distance, cos: height / distance }, distance)
+    }
+}
+
+/// The curved side of a cone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConeSide {
+    tip: DVec3,
+    /// Unit vector from the tip to the base.
+    axis: DVec3,
+    /// Sine and cosine of the half angle at the tip.
+    opening: (f64, f64),
+    /// Length from the tip to the rim of the base.
+    slant: f64,
+}
+
+/// A cone seen from a point. The pole points to the tip; each half plane contains one straight line on the side, from the tip to
+/// the base.
+pub struct ConeView {
+    pole: PolarFrame,
+    reach: SinCos,
+    /// Distance to the tip.
+    distance: f64,
+    /// Cosine and sine of the angle at the tip between the point and the axis.
+    off_axis: (f64, f64),
+    /// Cosine of the half angle at the tip.
+    cos_opening: f64,
+    slant: f64,
+}
+
+impl RevolutionEmitter<ConeSide> {
+    /// The emitter of an entire cone.
+    pub fn of_cone(cone: &Cone) -> Self {
+        let (base, tip) = (cone.base(), cone.tip());
+        let (height, radius) = ((base.centroid() - tip).length(), base.radius());
+        let slant = (height * height + radius * radius).sqrt();
+        let side = ConeSide { tip, axis: base.normal(), opening: (radius / slant, height / slant), slant };
+        let cap = cone.is_capped().then(|| DiskEmitter::new(&base));
+        Self { side, caps: [cap, None], middle: cone.centroid() }
+    }
+}
+
+impl RevolutionSide for ConeSide {
+    type RevolutionView = ConeView;
+
+    fn seen_from(&self, point: Vec3) -> Option<ConeView> {
+        let to_tip = self.tip - point.as_dvec3();
+        let distance = to_tip.length();
+        let pole = to_tip / distance;
+        let cos = -pole.dot(self.axis);
+        let across = self.axis + pole * cos;
+        let sin = across.length();
+        let (sin_opening, cos_opening) = self.opening;
+        let is_around = cos <= -cos_opening;
+        let reach = if is_around {
+            SinCos { sin: 0.0, cos: -1.0 }
+        } else {
+            let cos_reach = ((cos_opening - cos) * (cos_opening + cos)).max(0.0).sqrt() / sin;
+            SinCos { sin: (sin_opening / sin).min(1.0), cos: cos_reach }
+        };
+        let front = if sin > 0.0 { across / sin } else { perpendicular(pole) };
+        (distance > 0.0 && cos < cos_opening).then(|| ConeView {
+            pole: PolarFrame::new(pole, front),
+            reach,
+            distance,
+            off_axis: (cos, sin),
+            cos_opening,
+            slant: self.slant,
+        })
+    }
+}
+
+impl ConeView {
+    /// Angle at the tip between the point and the side's line in a half plane.
+    fn at_tip(&self, around: SinCos) -> SinCos {
+        let ((m, sin), c) = (self.off_axis, self.cos_opening);
+        let q = sin * around.cos;
+        let square = m * m + q * q;
+        let w = (square - c * c).max(0.0).sqrt();
+        // Choose the nearer of the two lines at this angle from the axis.
+        let sin = if m > 0.0 { (c - m) * (c + m) / (q * c + m * w) } else { (q * c - m * w) / square };
+        SinCos { sin, cos: (m * c + q * w) / square }
+    }
+}
+
+impl RevolutionSideView for ConeView {
+    fn pole(&self) -> &PolarFrame {
+        &self.pole
+    }
+
+    fn reach(&self) -> SinCos {
+        self.reach
+    }
+
+    fn stretch(&self, around: SinCos) -> f64 {
+        let at_tip = self.at_tip(around);
+        let (along, across) = (self.distance - self.slant * at_tip.cos, self.slant * at_tip.sin);
+        let length = (along * along + across * across).sqrt();
+        if along > 0.0 { across * across / (length * (length + along)) } else { 1.0 - along / length }
+    }
+
+    fn place(&self, around: SinCos, share: f64) -> (SinCos, f64) {
+        let at_tip = self.at_tip(around);
+        let versine = share * self.stretch(around);
+        let from_pole = SinCos { sin: (versine * (2.0 - versine)).max(0.0).sqrt(), cos: 1.0 - versine };
+        let sin = at_tip.sin * from_pole.cos + at_tip.cos * from_pole.sin;
+        let farthest = self.distance + self.slant;
+        let distance = self.distance * at_tip.sin / sin;
+        (from_pole, if (distance > 0.0) & (distance < farthest) { distance } else { farthest })
+    }
+}

@@ -1,0 +1,289 @@
+//! Equirectangular environment maps.
+
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+use crate::materials::texels::Texels;
+use crate::math::color::luminance;
+use crate::math::elementary::{atan2, sin_cos};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
+use crate::math::{DVec3, Vec3};
+use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
+use crate::sampling::warp;
+
+/// An environment map and its sampling distribution. The top row is at +y, the image center at −z, and the right quarter at +x.
+/// Colors are interpolated between texel centers. A cell is the area between four texel centers, or between two above the first
+/// row and below the last one. Within a cell, the sampling density is proportional to the luminance, interpolated along the row
+/// and along the height.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentMap {
+    texels: Arc<Texels>,
+    cells: PiecewiseConstant2D,
+    /// Cosines of the polar angles at which the rows of cells begin, followed by −1.
+    heights: Vec<f64>,
+    /// Pdf in sr⁻¹ of each row, if it were uniform.
+    pdfs: Vec<f32>,
+    /// Mean luminance over all directions.
+    mean_luminance: f64,
+}
+
+/// A position between four texels.
+#[derive(Clone, Copy)]
+struct TexelPosition {
+    column: u32,
+    row: u32,
+    /// Fractions from left to right and, in terms of angle, from top to bottom.
+    between: [f32; 2],
+    /// The same fractions, but in terms of height from top to bottom.
+    along: [f32; 2],
+}
+
+impl EnvironmentMap {
+    /// A map of nonnegative texels. `None` if all are black.
+    pub fn new(texels: Arc<Texels>) -> Option<Self> {
+        let (columns, rows) = (texels.width as usize, texels.height as usize);
+        let height = |row: usize| match row {
+            0 => 1.0,
+            row if row > rows => -1.0,
+            row => libm::cos((row as f64 - 0.5) * std::f64::consts::PI / rows as f64),
+        };
+        let heights: Vec<f64> = (0..=rows + 1).map(height).collect();
+        let luminances = |row: usize| -> Vec<f64> {
+            (0..texels.width).map(|x| f64::from(luminance(texels.get(x, row as u32)))).collect()
+        };
+        let mut upper = luminances(0);
+        let mut sum = 0.0;
+        let weights = (0..=rows).map(|row| {
+            let lower = luminances(row.min(rows - 1));
+            let both: Vec<f64> = upper.iter().zip(&lower).map(|(upper, lower)| upper + lower).collect();
+            upper = lower;
+            let extent = heights[row] - heights[row + 1];
+            sum += both.iter().sum::<f64>() * extent;
+            (0..columns).map(|column| (both[column] + both[(column + 1) % columns]) * extent).collect()
+        });
+        let cells = PiecewiseConstant2D::new(columns, weights)?;
+        let density = |row: usize| {
+            let extent = 2.0 * std::f64::consts::PI / columns as f64 * (heights[row] - heights[row + 1]);
+            (f64::from(cells.row_probability(row)) / extent) as f32
+        };
+        let pdfs = (0..=rows).map(density).collect();
+        // The sum counts both texel rows around each row of cells, and heights from 1 to −1.
+        let mean_luminance = sum / (4.0 * columns as f64);
+        Some(Self { texels, cells, heights, pdfs, mean_luminance })
+    }
+
+    /// Mean luminance over all directions.
+    pub fn mean_luminance(&self) -> f64 {
+        self.mean_luminance
+    }
+
+    /// Mean color over all directions. Between row centers, colors are linear in the polar angle.
+    pub fn mean(&self) -> Vec3 {
+        let rows = self.texels.height;
+        let step = std::f64::consts::PI / f64::from(rows);
+        let (sin, cos) = (|row: f64| libm::sin((row + 0.5) * step), |row: f64| libm::cos((row + 0.5) * step));
+        let of_row = |row: u32| {
+            let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
+            let at = f64::from(row);
+            // Integrate ∫ sin θ dθ, weighted by the row's interpolation weight, above and below it.
+            let above = if row == 0 { 1.0 - cos(at) } else { (sin(at) - sin(at - 1.0)) / step - cos(at) };
+            let is_last = row + 1 == rows;
+            let below = if is_last { 1.0 + cos(at) } else { cos(at) - (sin(at + 1.0) - sin(at)) / step };
+            sum * (above + below)
+        };
+        let sum: DVec3 = (0..rows).map(of_row).sum();
+        (sum / (2.0 * f64::from(self.texels.width))).as_vec3()
+    }
+
+    /// Color in a unit direction, and the sampling pdf there in sr⁻¹. `turn` is the map's rotation about +y, as a
+    /// fraction of 360°, counterclockwise seen from above.
+    #[inline(always)]
+    pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
+        let place = self.place(direction, turn);
+        let corners = self.corners(place.column, place.row);
+        let density = self.density(place.column, place.row);
+        (color(&corners, place.between), density * share(&luminances(&corners), place.along))
+    }
+
+    /// Samples a unit direction; returns it with the color and pdf that [`EnvironmentMap::lookup`] would return.
+    #[inline(always)]
+    pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
+        let GridSample { column, row, rest } = self.cells.sample(u);
+        let corners = self.corners(column as u32, row as u32);
+        let luminances = luminances(&corners);
+        let along = warp::bilinear(rest, &luminances);
+        let (direction, down) = self.towards(column as f32, row, along, turn);
+        let density = self.density(column as u32, row as u32);
+        (direction, color(&corners, [along[0], down]), density * share(&luminances, along))
+    }
+
+    /// The unit direction at fractions of a cell along its row and along its height, and the vertical fraction in terms of angle.
+    #[inline(always)]
+    fn towards(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
+        let extent = self.heights[row + 1] - self.heights[row];
+        self.by_height(column, row as f32, self.heights[row] + extent * f64::from(along[1]), along[0], turn)
+    }
+
+    /// The unit direction at height `y` in a cell, at a fraction along its row, and the vertical fraction in terms of angle.
+    #[inline(always)]
+    fn by_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
+        let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
+        let turns = (column + 0.5 + along) / self.texels.width as f32 - 0.5 - turn;
+        let (sin, cos) = sin_cos(2.0 * PI * turns);
+        let direction = Vec3::new(across * sin, y as f32, -across * cos);
+        let down = atan2(across, y as f32) * (1.0 / PI) * self.texels.height as f32 + 0.5 - row;
+        (direction, down.max(0.0).min(1.0))
+    }
+
+    /// [`EnvironmentMap::sample`] for a packet: unit directions, colors and pdfs. Memory lookups alternate with branch-free loops.
+    #[inline(always)]
+    pub fn sample_row(&self, u: &[F32x16; 2], turn: f32) -> (Vec3x16, Vec3x16, F32x16) {
+        let (mut columns, mut rows, mut rest) = ([0; PACKET_SIZE], [0; PACKET_SIZE], [[0.0; PACKET_SIZE]; 2]);
+        let (mut tops, mut extents) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        let mut pdfs = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            let at = self.cells.sample([u[0][i], u[1][i]]);
+            (columns[i], rows[i]) = (at.column as u32, at.row as u32);
+            (rest[0][i], rest[1][i]) = (at.rest[0], at.rest[1]);
+            tops[i] = self.heights[at.row];
+            extents[i] = self.heights[at.row + 1] - tops[i];
+            pdfs[i] = self.density(at.column as u32, at.row as u32);
+        }
+        let corners = self.corner_rows(&columns, &rows);
+        let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
+        for i in 0..PACKET_SIZE {
+            let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
+            let luminances = luminances(&corners);
+            let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
+            let y = tops[i] + extents[i] * f64::from(along[1]);
+            let (direction, down) =
+                self.by_height(columns[i] as i32 as f32, rows[i] as i32 as f32, y, along[0], turn);
+            set_lane(&mut directions, i, direction);
+            set_lane(&mut colors, i, color(&corners, [along[0], down]));
+            pdfs[i] *= share(&luminances, along);
+        }
+        (directions, colors, pdfs)
+    }
+
+    /// [`EnvironmentMap::lookup`] for a packet.
+    #[inline(always)]
+    pub fn lookup_row(&self, directions: &Vec3x16, turn: f32) -> (Vec3x16, F32x16) {
+        let (mut columns, mut rows) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
+        let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
+            let (x, y) = self.coordinates(lane(directions, i), turn);
+            (columns[i], rows[i]) = self.cell(x, y);
+            between[i] = x - columns[i] as i32 as f32;
+            angles[i] = y - rows[i] as i32 as f32;
+        }
+        let corners = self.corner_rows(&columns, &rows);
+        let (mut heights, mut pdfs) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
+            pdfs[i] = self.density(columns[i], rows[i]);
+            heights[i] = self.part_of_height(rows[i], directions[1][i]);
+        }
+        let mut colors = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
+            let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
+            set_lane(&mut colors, i, color(&corners, [between[i], angles[i]]));
+            pdfs[i] *= share(&luminances(&corners), [between[i], heights[i]]);
+        }
+        (colors, pdfs)
+    }
+
+    #[inline(always)]
+    fn place(&self, direction: Vec3, turn: f32) -> TexelPosition {
+        let (x, y) = self.coordinates(direction, turn);
+        let (column, row) = self.cell(x, y);
+        let between = [x - column as f32, y - row as f32];
+        TexelPosition { column, row, between, along: [between[0], self.part_of_height(row, direction.y)] }
+    }
+
+    /// Cell coordinates of a unit direction.
+    #[inline(always)]
+    fn coordinates(&self, direction: Vec3, turn: f32) -> (f32, f32) {
+        let (width, height) = (self.texels.width as f32, self.texels.height as f32);
+        let turns = 0.5 + atan2(direction.x, -direction.z) * (0.5 / PI) + turn;
+        let x = (turns - turns.floor()) * width - 0.5;
+        let x = if x < 0.0 { x + width } else { x };
+        let across = (direction.x * direction.x + direction.z * direction.z).sqrt();
+        (x, atan2(across, direction.y) * (1.0 / PI) * height + 0.5)
+    }
+
+    /// Column and row of cell coordinates.
+    #[inline(always)]
+    fn cell(&self, x: f32, y: f32) -> (u32, u32) {
+        // A number just below 0 may have been rounded up to the width.
+        ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
+    }
+
+    /// Fraction of a cell row's height above a direction.
+    #[inline(always)]
+    fn part_of_height(&self, row: u32, y: f32) -> f32 {
+        let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
+        (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
+    }
+
+    /// Indices of the texels around a cell: upper left, upper right, lower left, lower right.
+    #[inline(always)]
+    fn corner_places(&self, column: u32, row: u32) -> [usize; 4] {
+        let (width, column) = (self.texels.width as usize, column as usize);
+        let right = if column + 1 == width { 0 } else { column + 1 };
+        let upper = row.saturating_sub(1) as usize * width;
+        let lower = row.min(self.texels.height - 1) as usize * width;
+        [upper + column, upper + right, lower + column, lower + right]
+    }
+
+    /// The texels around a cell.
+    #[inline(always)]
+    fn corners(&self, column: u32, row: u32) -> [Vec3; 4] {
+        // Avoid `map`, which may not be inlined.
+        let [a, b, c, d] = self.corner_places(column, row);
+        [self.texels.at(a), self.texels.at(b), self.texels.at(c), self.texels.at(d)]
+    }
+
+    /// The texels around a packet of cells. Separate loops let cache misses overlap.
+    #[inline(always)]
+    fn corner_rows(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
+        let mut places = [[0; PACKET_SIZE]; 4];
+        for i in 0..PACKET_SIZE {
+            let own = self.corner_places(columns[i], rows[i]);
+            for corner in 0..4 {
+                places[corner][i] = own[corner];
+            }
+        }
+        let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
+        for corner in 0..4 {
+            self.texels.gather_packet(&places[corner], &mut corners[corner]);
+        }
+        corners
+    }
+
+    /// Mean pdf of a cell in sr⁻¹.
+    #[inline(always)]
+    fn density(&self, column: u32, row: u32) -> f32 {
+        self.pdfs[row as usize] * self.cells.column_probability(row as usize, column as usize)
+    }
+}
+
+/// Bilinear interpolation between the texels around a cell.
+#[inline(always)]
+fn color(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
+    corners[0].lerp(corners[1], between[0]).lerp(corners[2].lerp(corners[3], between[0]), between[1])
+}
+
+#[inline(always)]
+fn luminances(corners: &[Vec3; 4]) -> [f32; 4] {
+    corners.map(luminance)
+}
+
+/// Pdf at a position in a cell, relative to the cell's mean.
+#[inline(always)]
+fn share(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
+    let [a, b, c, d] = *luminances;
+    let upper = a + (b - a) * along[0];
+    let lower = c + (d - c) * along[0];
+    let sum = (a + b) + (c + d);
+    let share = 4.0 * (upper + (lower - upper) * along[1]) / sum;
+    if sum > 0.0 { share.max(0.0) } else { 0.0 }
+}

@@ -1,0 +1,167 @@
+//! Samples of one light for a packet of points.
+
+use super::sample::{LightObject, LightSample, ShadowRayEnd};
+use crate::math::Vec3;
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
+
+/// Samples of a light for a packet of points: a packet of [`LightSample`]s.
+#[derive(Clone, Debug)]
+pub struct LightSamplePacket {
+    /// Unit directions to the light.
+    pub directions: Vec3x16,
+    /// Sampled points.
+    pub targets: Vec3x16,
+    /// [`LightSample::weight`]; 0 for dark samples.
+    pub weights: Vec3x16,
+    /// Geometry that the shadow rays ignore.
+    pub sources: LightObjectPacket,
+    /// Mask of samples at infinity.
+    pub beyond: u32,
+    /// Inverse pdfs in sr, only for an environment. Other lights compute theirs on request.
+    pub(super) environment_inverse_pdfs: F32x16,
+}
+
+/// A packet of [`LightObject`]s.
+#[derive(Clone, Debug)]
+pub struct LightObjectPacket {
+    /// The object; [`LightObjectPacket::NONE`] for no geometry.
+    pub object: [u32; PACKET_SIZE],
+    /// The primitive; [`LightObjectPacket::NONE`] for the entire object.
+    pub part: [u32; PACKET_SIZE],
+    /// Whether any lane has an object.
+    pub is_any: bool,
+}
+
+impl LightObjectPacket {
+    /// Marks a lane without an object, or without a single primitive.
+    pub const NONE: u32 = u32::MAX;
+
+    /// Marks a [`LightObject::SeeThrough`] lane; no primitive has this number.
+    const SEE_THROUGH: u32 = u32::MAX - 1;
+
+    /// The same source in all lanes.
+    #[inline(always)]
+    pub fn of(source: LightObject) -> Self {
+        let (object, part) = numbers(source);
+        Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
+    }
+
+    /// Copies a lane of another packet.
+    #[inline(always)]
+    pub fn copy(&mut self, lane: usize, other: &Self, from: usize) {
+        (self.object[lane], self.part[lane]) = (other.object[from], other.part[from]);
+        self.is_any |= other.is_any;
+    }
+
+    /// The source of a lane.
+    #[inline]
+    pub fn source(&self, lane: usize) -> LightObject {
+        match (self.object[lane], self.part[lane]) {
+            (Self::NONE, _) => LightObject::Nothing,
+            (object, Self::NONE) => LightObject::Object(object),
+            (object, Self::SEE_THROUGH) => LightObject::SeeThrough(object),
+            (object, part) => LightObject::Primitive(object, part),
+        }
+    }
+
+    /// Sets the source of a lane.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, source: LightObject) {
+        (self.object[lane], self.part[lane]) = numbers(source);
+        self.is_any |= self.object[lane] != Self::NONE;
+    }
+}
+
+#[inline(always)]
+fn numbers(source: LightObject) -> (u32, u32) {
+    match source {
+        LightObject::Nothing => (LightObjectPacket::NONE, LightObjectPacket::NONE),
+        LightObject::Object(object) => (object, LightObjectPacket::NONE),
+        LightObject::SeeThrough(object) => (object, LightObjectPacket::SEE_THROUGH),
+        LightObject::Primitive(object, part) => (object, part),
+    }
+}
+
+/// Builds a packet from the direction, target and weight of each lane. This is a macro because a function with a closure is not
+/// always inlined into its caller, and then misses the caller's instruction set.
+macro_rules! packet_of {
+    ($source:expr, $i:ident => $sample:expr) => {{
+        let mut row = $crate::lights::packet::LightSamplePacket::dark($source);
+        for $i in 0..$crate::math::lanes::PACKET_SIZE {
+            let (direction, target, weight) = $sample;
+            $crate::math::lanes::set_lane(&mut row.directions, $i, direction);
+            $crate::math::lanes::set_lane(&mut row.targets, $i, target);
+            $crate::math::lanes::set_lane(&mut row.weights, $i, weight);
+        }
+        row
+    }};
+}
+
+pub(super) use packet_of;
+
+/// [`packet_of`] for lights at infinity.
+macro_rules! infinite_packet_of {
+    ($i:ident => $sample:expr) => {{
+        let row = $crate::lights::packet::packet_of!($crate::lights::sample::LightObject::Nothing, $i => {
+            let (direction, weight) = $sample;
+            (direction, $crate::math::Vec3::ZERO, weight)
+        });
+        $crate::lights::packet::LightSamplePacket { beyond: u32::MAX, ..row }
+    }};
+}
+
+pub(super) use infinite_packet_of;
+
+impl LightSamplePacket {
+    /// Copies the lanes in mask `bits` from another packet.
+    #[inline(always)]
+    pub(super) fn take_lanes(&mut self, bits: u32, other: &Self) {
+        let of = mask_from_bits(bits);
+        for axis in 0..3 {
+            select(&of, &other.directions[axis], &mut self.directions[axis]);
+            select(&of, &other.targets[axis], &mut self.targets[axis]);
+            select(&of, &other.weights[axis], &mut self.weights[axis]);
+        }
+        select_u32(&of, &other.sources.object, &mut self.sources.object);
+        select_u32(&of, &other.sources.part, &mut self.sources.part);
+        self.sources.is_any |= other.sources.is_any;
+        self.beyond = self.beyond & !bits | other.beyond & bits;
+    }
+
+    #[inline(always)]
+    pub(super) fn dark(source: LightObject) -> Self {
+        Self {
+            directions: [[0.0; PACKET_SIZE]; 3],
+            targets: [[0.0; PACKET_SIZE]; 3],
+            weights: [[0.0; PACKET_SIZE]; 3],
+            sources: LightObjectPacket::of(source),
+            beyond: 0,
+            environment_inverse_pdfs: [0.0; PACKET_SIZE],
+        }
+    }
+
+    fn put(&mut self, i: usize, sample: &LightSample) {
+        set_lane(&mut self.directions, i, sample.direction);
+        set_lane(&mut self.weights, i, sample.weight);
+        self.sources.set(i, sample.source);
+        match sample.end {
+            ShadowRayEnd::At(target) => set_lane(&mut self.targets, i, target),
+            ShadowRayEnd::Beyond => self.beyond |= 1 << i,
+        }
+    }
+
+    /// Samples the points in mask `used` one by one.
+    pub(super) fn lane_by_lane(
+        points: &Vec3x16,
+        used: u32,
+        sample: impl Fn(usize, Vec3) -> Option<LightSample>,
+    ) -> Self {
+        let mut row = Self::dark(LightObject::Nothing);
+        for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
+            if let Some(sample) = sample(i, lane(points, i)) {
+                row.put(i, &sample);
+            }
+        }
+        row
+    }
+}

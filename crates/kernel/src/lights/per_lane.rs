@@ -1,0 +1,142 @@
+//! Light samples for a packet of points, each of which picked its own light.
+
+use super::area::mesh::{AreaSampledTriangles, MeshEmitter};
+use super::area::packet::triangle_packet_of;
+use super::area::quad::QuadEmitter;
+use super::area::sphere::SphereEmitter;
+use super::area::{AreaLight, LightSamplePoint, ShapeEmitter};
+use super::delta::DeltaLight;
+use super::packet::{LightSamplePacket, packet_of};
+use super::sample::LightObject;
+use super::{Light, Lights};
+use crate::geometry::packet::lanes;
+use crate::math::Vec3;
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
+
+/// Samples convex emitters for a packet, one emitter per lane.
+macro_rules! convex_packet_of {
+    ($i:ident => $all:expr, $points:expr, $u:expr) => {{
+        let mut row = packet_of!(LightObject::Nothing, $i => {
+            let (emitter, light) = $all[$i];
+            let LightSamplePoint { direction, target, factor } =
+                emitter.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+            (direction, target, light.radiance * factor)
+        });
+        for $i in 0..PACKET_SIZE {
+            row.sources.set($i, LightObject::Object($all[$i].1.object));
+        }
+        row
+    }};
+}
+
+impl Lights {
+    /// [`Light::sample`] for each point in mask `used`, with its own light. Returns the samples, the inverse pdfs in sr (as
+    /// [`Light::inverse_pdfs`]), and the number of texture lookups.
+    #[inline(always)]
+    pub fn sample_per_lane(
+        &self,
+        picked: &[u32; PACKET_SIZE],
+        (points, normals): (&Vec3x16, &Vec3x16),
+        used: u32,
+        u: &[F32x16; 2],
+    ) -> (LightSamplePacket, F32x16, u64) {
+        let mut lights = [self.get(picked[0]); PACKET_SIZE];
+        for i in 1..PACKET_SIZE {
+            lights[i] = self.get(picked[i]);
+        }
+        let mut row = LightSamplePacket::dark(LightObject::Nothing);
+        let mut left = used;
+        // Sample all lights of one kind together. Other lanes get a copy of one of these lights; their results are discarded.
+        while left != 0 {
+            let first = left.trailing_zeros() as usize % PACKET_SIZE;
+            let mut of = 0;
+            let found = if let Some(filler) = lights[first].as_point() {
+                let lights = same_kind((&lights, left), &mut of, Light::as_point, filler);
+                packet_of!(LightObject::Nothing, i => {
+                    let (direction, weight) = lights[i].arriving(lane(points, i));
+                    (direction, lights[i].position.as_vec3(), weight)
+                })
+            } else if let Some(filler) = sphere(lights[first]) {
+                let balls = same_kind((&lights, left), &mut of, sphere, filler);
+                convex_packet_of!(i => balls, points, u)
+            } else if let Some(filler) = quad(lights[first]) {
+                let quads = same_kind((&lights, left), &mut of, quad, filler);
+                let mut row = convex_packet_of!(i => quads, points, u);
+                for i in 0..PACKET_SIZE {
+                    if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
+                        row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                    }
+                }
+                row
+            } else if let Some(filler) = facets(lights[first]) {
+                let all = same_kind((&lights, left), &mut of, facets, filler);
+                triangle_packet_of!(i => (all[i].0, all[i].1), points, u)
+            } else {
+                of = 1 << first;
+                let sample = |i: usize, point| {
+                    lights[i].sample_untextured(point, lane(normals, i), [u[0][i], u[1][i]])
+                };
+                LightSamplePacket::lane_by_lane(points, of, sample)
+            };
+            // Usually, all lanes picked lights of the same kind.
+            if of == used {
+                row = found;
+            } else {
+                row.take_lanes(of, &found);
+            }
+            left &= !of;
+        }
+        let mut inverse = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            inverse[i] = lights[i].inverse_pdf(lane(&row.directions, i), lane(&row.weights, i));
+        }
+        // Apply the emission textures; the pdfs are those without textures.
+        let mut lookups = 0;
+        for i in lanes(used) {
+            let weight = lane(&row.weights, i);
+            if let Some(texture) = lights[i].emission_texture().filter(|_| weight != Vec3::ZERO) {
+                let (target, direction) = (lane(&row.targets, i), lane(&row.directions, i));
+                let weight = weight * texture.at(target, row.sources.part[i], direction);
+                set_lane(&mut row.weights, i, weight);
+                lookups += 1;
+            }
+        }
+        (row, inverse, lookups)
+    }
+}
+
+#[inline(always)]
+fn sphere(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
+    let light = light.as_area()?;
+    light.shape.as_sphere().map(|sphere| (sphere, light))
+}
+
+#[inline(always)]
+fn quad(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
+    let light = light.as_area()?;
+    light.shape.as_quad().map(|(quad, _)| (quad, light))
+}
+
+#[inline(always)]
+fn facets(light: &Light) -> Option<(&AreaSampledTriangles, &AreaLight)> {
+    let light = light.as_area()?;
+    light.shape.as_mesh().and_then(MeshEmitter::facets).map(|facets| (facets, light))
+}
+
+/// The lights of one kind. Lanes that have one are added to `of`; the other lanes get the filler.
+#[inline(always)]
+fn same_kind<'a, T: Copy>(
+    (lights, left): (&[&'a Light; PACKET_SIZE], u32),
+    of: &mut u32,
+    kind: impl Fn(&'a Light) -> Option<T>,
+    filler: T,
+) -> [T; PACKET_SIZE] {
+    let mut all = [filler; PACKET_SIZE];
+    for i in 0..PACKET_SIZE {
+        if let Some(own) = kind(lights[i]) {
+            all[i] = own;
+            *of |= left & 1 << i;
+        }
+    }
+    all
+}

@@ -1,0 +1,242 @@
+//! Aims photons at target spheres.
+
+use std::f64::consts::{PI, TAU};
+
+use arrayvec::ArrayVec;
+
+use super::BoundingSphere;
+use crate::lights::area::sphere::one_minus_cos;
+use crate::lights::delta::DeltaLight;
+use crate::math::frame::Frame;
+use crate::math::{DVec3, Vec3};
+use crate::sampling::distribution::Discrete;
+use crate::sampling::warp;
+
+/// Spheres that photons are aimed at. A sphere is chosen by the light expected to reach it; then a direction or a point is
+/// sampled uniformly over its visible part.
+#[derive(Clone, Debug)]
+pub struct Targets {
+    balls: Vec<BoundingSphere>,
+    /// Distribution of the spheres by squared radius.
+    pick_by_disk: Discrete,
+}
+
+/// Maximum number of targets; more are merged.
+pub const MAX_TARGETS: usize = 32;
+
+/// Directional distribution of the light emitted at a point.
+pub enum EmissionProfile<'a> {
+    /// A delta light's distribution.
+    Light {
+        /// The light.
+        light: &'a dyn DeltaLight,
+        /// [`DeltaLight::solid_angle`], which is expensive to compute for some lights.
+        spread: f64,
+    },
+    /// A cosine distribution around this unit normal.
+    Front(DVec3),
+}
+
+impl EmissionProfile<'_> {
+    /// Power divided by peak intensity, in sr.
+    pub fn spread(&self) -> f64 {
+        match self {
+            Self::Light { spread, .. } => *spread,
+            Self::Front(_) => PI,
+        }
+    }
+
+    /// Intensity in a direction, relative to the peak intensity.
+    pub fn share(&self, direction: Vec3) -> f64 {
+        match self {
+            Self::Light { light, .. } => f64::from(light.share(direction)),
+            Self::Front(normal) => direction.as_dvec3().dot(*normal).max(0.0),
+        }
+    }
+
+    /// Upper bound on [`EmissionProfile::share`] over a cone of directions with a half angle of up to 90°, given its sine.
+    fn max_share(&self, axis: DVec3, sin: f64) -> f64 {
+        let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
+        // Cosine of the angle from a direction to the nearest one in the cone.
+        let nearest = |direction: DVec3| {
+            let along = direction.dot(axis).clamp(-1.0, 1.0);
+            let across = ((1.0 - along) * (1.0 + along)).sqrt();
+            if along >= cos { 1.0 } else { along * cos + across * sin }
+        };
+        match self {
+            Self::Light { light, .. } => {
+                let cone = light.bounds().cone;
+                let is_met = nearest(cone.axis) >= cone.cos - 1e-9;
+                f64::from(u8::from(is_met))
+            }
+            Self::Front(normal) => nearest(*normal).max(0.0),
+        }
+    }
+}
+
+impl Targets {
+    /// Creates targets from spheres. `None` if none has a positive radius.
+    pub fn new(balls: &[BoundingSphere]) -> Option<Self> {
+        let balls: Vec<BoundingSphere> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
+        let balls = merged(balls);
+        let pick_by_disk = Discrete::new(balls.iter().map(|ball| ball.radius * ball.radius))?;
+        Some(Self { balls, pick_by_disk })
+    }
+
+    /// All of them.
+    #[cfg(test)]
+    pub fn balls(&self) -> &[BoundingSphere] {
+        &self.balls
+    }
+
+    /// Chooses a target for light from infinity.
+    pub fn pick_by_disk(&self, u: f32) -> &BoundingSphere {
+        &self.balls[self.pick_by_disk.sample(u).0]
+    }
+
+    /// Total area of the targets' disks.
+    pub fn disk_area(&self) -> f64 {
+        PI * self.pick_by_disk.total()
+    }
+
+    /// Area density of points sampled uniformly on the disks of [`Targets::pick_by_disk`], at a point that is on some of them.
+    pub fn disk_density(&self, is_on: impl Fn(&BoundingSphere) -> bool) -> f64 {
+        // Disks are chosen proportionally to their area, so each contributes the same density.
+        self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.disk_area()
+    }
+
+    /// The targets seen from a point that emits light.
+    #[inline]
+    pub fn seen_from<'a>(&self, from: DVec3, sends: &'a EmissionProfile<'a>) -> TargetView<'a> {
+        let mut view = TargetView { sends, seen: ArrayVec::new(), total: 0.0 };
+        for ball in &self.balls {
+            let cone = TargetCone::around(ball, from);
+            let weight = match &cone {
+                Some(cone) => cone.solid_angle() * sends.max_share(cone.axis, cone.sin),
+                None => sends.spread(),
+            };
+            if weight > 0.0 {
+                view.total += weight;
+                view.seen.push(VisibleTarget { cone, weight });
+            }
+        }
+        view
+    }
+}
+
+/// Targets seen from a point that emits light.
+pub struct TargetView<'a> {
+    sends: &'a EmissionProfile<'a>,
+    /// Targets that the light can reach.
+    seen: ArrayVec<VisibleTarget, MAX_TARGETS>,
+    total: f64,
+}
+
+/// A target seen from a point that emits light.
+struct VisibleTarget {
+    /// The cone of directions to it. `None` if the point is inside.
+    cone: Option<TargetCone>,
+    /// Upper bound on the power it receives, relative to the peak intensity, in sr.
+    weight: f64,
+}
+
+impl TargetView<'_> {
+    /// Upper bound on the total power that the targets receive, relative to the peak intensity, in sr.
+    pub fn total(&self) -> f64 {
+        self.total
+    }
+
+    /// Samples a direction uniformly over a target's cone; returns it with the target. Returns `None` if the point is inside the
+    /// target or there is no target; an unaimed direction is then used instead.
+    pub fn sample(&self, u: f32, direction: [f32; 2]) -> Option<(Vec3, usize)> {
+        let goal = f64::from(u) * self.total;
+        let (mut sum, mut target) = (0.0, 0);
+        for (number, seen) in self.seen.iter().enumerate() {
+            if sum <= goal {
+                target = number;
+            }
+            sum += seen.weight;
+        }
+        let cone = self.seen.get(target)?.cone.as_ref()?;
+        let local = warp::cone(direction, cone.one_minus_cos);
+        Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
+    }
+
+    /// Pdf of aimed directions divided by that of emitted ones, at a direction generated for the target `made_for` or by
+    /// emission. ∞ if emission never generates it.
+    pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
+        if !(self.total > 0.0) {
+            return 1.0;
+        }
+        let (mut by_cones, mut by_others) = (0.0, 0.0);
+        for (number, VisibleTarget { cone, weight }) in self.seen.iter().enumerate() {
+            match cone {
+                // At the very edge, rounding decides.
+                Some(cone) if made_for == Some(number) || cone.contains(direction) => {
+                    by_cones += weight / cone.solid_angle();
+                }
+                Some(_) => {}
+                None => by_others += weight,
+            }
+        }
+        let by_cones =
+            if by_cones > 0.0 { by_cones * self.sends.spread() / self.sends.share(direction) } else { 0.0 };
+        (by_cones + by_others) / self.total
+    }
+}
+
+/// The cone of directions to a sphere.
+struct TargetCone {
+    axis: DVec3,
+    /// Sine of its half angle.
+    sin: f64,
+    one_minus_cos: f32,
+}
+
+impl TargetCone {
+    /// The cone to a sphere seen from a point. `None` from inside.
+    fn around(ball: &BoundingSphere, from: DVec3) -> Option<Self> {
+        let to_center = ball.center - from;
+        let distance = to_center.length();
+        let sin = ball.radius / distance;
+        (sin < 1.0).then(|| Self {
+            axis: to_center / distance,
+            sin,
+            one_minus_cos: one_minus_cos((sin * sin) as f32),
+        })
+    }
+
+    fn solid_angle(&self) -> f64 {
+        TAU * f64::from(self.one_minus_cos)
+    }
+
+    /// Whether a direction is inside the cone. Compares chords.
+    fn contains(&self, direction: Vec3) -> bool {
+        (direction.as_dvec3() - self.axis).length_squared() <= 2.0 * f64::from(self.one_minus_cos)
+    }
+}
+
+/// Merges spheres into at most [`MAX_TARGETS`]: the largest group is repeatedly split in two along its longest axis until there
+/// are enough groups.
+fn merged(balls: Vec<BoundingSphere>) -> Vec<BoundingSphere> {
+    if balls.len() <= MAX_TARGETS {
+        return balls;
+    }
+    let mut groups = vec![balls];
+    while groups.len() < MAX_TARGETS {
+        let size = |group: &Vec<BoundingSphere>| {
+            if group.len() > 1 { BoundingSphere::around(group).radius } else { 0.0 }
+        };
+        let sizes = groups.iter().map(size).enumerate();
+        let Some((largest, _)) = sizes.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };
+        let mut group = groups.swap_remove(largest);
+        let centers = || group.iter().map(|ball| ball.center);
+        let extent =
+            centers().fold(DVec3::NEG_INFINITY, DVec3::max) - centers().fold(DVec3::INFINITY, DVec3::min);
+        let axis = if extent.x >= extent.y.max(extent.z) { 0 } else { 1 + usize::from(extent.z > extent.y) };
+        group.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
+        let rest = group.split_off(group.len() / 2);
+        groups.extend([group, rest]);
+    }
+    groups.iter().map(|group| BoundingSphere::around(group)).collect()
+}

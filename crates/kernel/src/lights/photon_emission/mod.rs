@@ -1,0 +1,414 @@
+//! Photon emission: rays that start at lights and carry their power.
+//!
+//! A photon from light ℓ is a ray y. Its flux is the power per ray measure, Φ′(y), divided by the pdf of sampling such a photon,
+//! so that the mean flux over photons is the power of all lights. There are two ways to generate a photon, and the flux accounts
+//! for the pdf of both (one-sample multiple importance sampling; Veach, *Robust Monte Carlo Methods for Light Transport
+//! Simulation*, 1997, section 9.2.4). With probability 1 − q, the direction is sampled from the light's emission; with
+//! probability q, it is aimed at one of the [`BoundingSphere`]s around surfaces that need photons. Both ways choose the starting point
+//! identically. With the probabilities P and A of the light, and the ratio a(y)/e(y) of the other pdfs,
+//!
+//! flux = Φ′(y)/e(y) / ((1 − q)·P + q·A·a(y)/e(y)).
+
+mod aim;
+mod surface;
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use super::area::EmissionTexture;
+use super::delta::{Falloff, PointLight};
+use super::light::{Light, LightFamily};
+use super::set::Lights;
+use super::tree::bounds::mean_channel;
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Ray, Shape};
+use crate::math::frame::Frame;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::distribution::Discrete;
+use crate::sampling::warp;
+
+use aim::{EmissionProfile, Targets};
+use surface::EmissiveSurface;
+
+/// A bounding sphere, in the coordinates of the lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundingSphere {
+    /// Center.
+    pub center: DVec3,
+    /// Radius.
+    pub radius: f64,
+}
+
+impl BoundingSphere {
+    /// A sphere that contains all the given ones, centered in their bounding box.
+    pub fn around(balls: &[Self]) -> Self {
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for Self { center, radius } in balls {
+            (min, max) = (min.min(*center - *radius), max.max(*center + *radius));
+        }
+        let center = if balls.is_empty() { DVec3::ZERO } else { (min + max) * 0.5 };
+        let reach = |ball: &Self| (ball.center - center).length() + ball.radius;
+        Self { center, radius: balls.iter().map(reach).fold(0.0, f64::max) }
+    }
+}
+
+/// The geometry of the object that emits a light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EmitterGeometry {
+    /// A shape.
+    Shape(Shape),
+    /// A mesh.
+    Mesh {
+        /// Upper bound on the error of each of its triangles at a hit.
+        rounding: f32,
+    },
+}
+
+/// The random numbers in [0, 1) that one photon uses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonNumbers {
+    /// Chooses the light and its piece.
+    pub light: [f32; 2],
+    /// Chooses whether to aim, and the target.
+    pub aim: [f32; 2],
+    /// Position on the light, or on the disk that light from infinity passes through.
+    pub position: [f32; 2],
+    /// Direction of the photon; for lights at infinity, the direction to the light.
+    pub direction: [f32; 2],
+}
+
+/// A newly emitted photon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EmittedPhoton {
+    /// Index of its light.
+    pub light: u32,
+    /// Where it starts.
+    pub start: PhotonOrigin,
+    /// Unit direction of travel.
+    pub direction: Vec3,
+    /// Power in W divided by the pdf of the photon; the mean over photons is the power of all lights.
+    pub flux: Vec3,
+    /// Whether it was aimed at a target.
+    pub is_aimed: bool,
+}
+
+/// Starting point of a photon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PhotonOrigin {
+    /// At a delta light.
+    Point(Vec3),
+    /// On a surface.
+    Surface {
+        /// The point.
+        point: Vec3,
+        /// Error bound of each component.
+        error: Vec3,
+        /// Unit normal on the emitting side.
+        normal: Vec3,
+    },
+    /// Beyond all finite objects, on a plane tangent to their bounding sphere. Infinite objects may still be between that point
+    /// and the light.
+    Beyond(Vec3),
+}
+
+impl EmittedPhoton {
+    /// The photon's ray, offset from its light's surface like a scattered ray.
+    pub fn ray(&self) -> Ray {
+        let origin = match self.start {
+            PhotonOrigin::Point(point) | PhotonOrigin::Beyond(point) => point,
+            PhotonOrigin::Surface { point, error, normal } => {
+                offset_origin(point, error, normal, self.direction)
+            }
+        };
+        Ray::new(origin, self.direction)
+    }
+}
+
+/// Emits photons from all lights.
+#[derive(Clone, Debug)]
+pub struct PhotonSource {
+    lights: Arc<Lights>,
+    sources: Vec<LightEmission>,
+    /// Bounding sphere of all finite objects, which light from infinity is emitted toward.
+    around: BoundingSphere,
+    by_power: Discrete,
+    aim: Option<PhotonAim>,
+}
+
+/// Emission data of one light.
+#[derive(Clone, Debug)]
+struct LightEmission {
+    /// Power in W.
+    power: Vec3,
+    /// For delta lights, power divided by peak intensity, in sr.
+    spread: f64,
+    /// For area lights, the emitting surface.
+    surface: Option<EmissiveSurface>,
+}
+
+/// How photons are aimed.
+#[derive(Clone, Debug)]
+struct PhotonAim {
+    targets: Targets,
+    /// Fraction of photons to aim.
+    share: f32,
+    /// Distribution of the lights, weighted by their estimated power toward the targets.
+    by_light: Discrete,
+}
+
+/// Fraction of aimed photons whose light is chosen by power, like that of unaimed ones, because an estimate of 0 may be wrong.
+const BY_POWER: f64 = 0.1;
+
+impl PhotonSource {
+    /// Creates the source for all lights. `emitter_geometry` returns the geometry of an object; `around` is a bounding sphere of all
+    /// finite objects. Returns `None` if no light emits photons. Lights without falloff emit none.
+    pub fn new(
+        lights: &Arc<Lights>,
+        emitter_geometry: impl Fn(u32) -> Option<EmitterGeometry>,
+        around: BoundingSphere,
+    ) -> Option<Self> {
+        let source = |(_, light): (u32, &Light)| LightEmission::new(light, &emitter_geometry, around);
+        let sources: Vec<LightEmission> = lights.iter().map(source).collect();
+        let by_power = Discrete::new(sources.iter().map(|source| mean_channel(source.power)))?;
+        Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
+    }
+
+    /// Aims a fraction `share` in [0, 1] of the photons at targets. If all are aimed, only rays that hit a target are generated,
+    /// and their mean flux is the power that reaches the targets.
+    #[must_use]
+    pub fn aimed_at(self, targets: &[BoundingSphere], share: f32) -> Self {
+        let targets = Targets::new(targets).filter(|_| share > 0.0);
+        let aim = targets.and_then(|targets| {
+            let power_toward = |(number, light)| self.power_toward(number, light, &targets);
+            let power_toward: Vec<f64> = self.lights.iter().map(power_toward).collect();
+            let (sum, total) = (power_toward.iter().sum::<f64>(), self.by_power.total());
+            let weight = |(number, power_toward): (usize, &f64)| {
+                let estimate = if sum > 0.0 { (1.0 - BY_POWER) * power_toward / sum } else { 0.0 };
+                estimate + BY_POWER * mean_channel(self.sources[number].power) / total
+            };
+            let by_light = Discrete::new(power_toward.iter().enumerate().map(weight))?;
+            Some(PhotonAim { targets, share: share.min(1.0), by_light })
+        });
+        Self { aim, ..self }
+    }
+
+    /// Bounding sphere of all finite objects.
+    pub fn around(&self) -> BoundingSphere {
+        self.around
+    }
+
+    /// Power of a light, in W.
+    pub fn power_of(&self, light: u32) -> Vec3 {
+        self.sources[light as usize].power
+    }
+
+    /// Total power of all lights, in W.
+    pub fn power(&self) -> Vec3 {
+        self.sources.iter().map(|source| source.power.as_dvec3()).sum::<DVec3>().as_vec3()
+    }
+
+    /// Fraction of photons that are aimed.
+    pub fn aimed_share(&self) -> f32 {
+        self.aim.as_ref().map_or(0.0, |aim| aim.share)
+    }
+
+    /// Emits a photon. Returns `None` if the chosen light or target receives nothing.
+    pub fn emit(&self, u: &PhotonNumbers) -> Option<EmittedPhoton> {
+        let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
+        let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
+        let (number, _) = by_light.sample(u.light[0]);
+        let targets = aim.map(|aim| &aim.targets);
+        let sample_photon = self
+            .sample_photon(number, targets, u)
+            .filter(|sample_photon| sample_photon.flux != Vec3::ZERO)?;
+        let (all, of_light) = (f64::from(self.aimed_share()), |by: &Discrete| by.share(number));
+        let aimed = self.aim.as_ref().map_or(0.0, |aim| all * of_light(&aim.by_light) * sample_photon.ratio);
+        let density = (1.0 - all) * of_light(&self.by_power) + aimed;
+        let flux = (sample_photon.flux.as_dvec3() / density).as_vec3();
+        let PhotonSample { start, direction, .. } = sample_photon;
+        let emitted = EmittedPhoton { light: number as u32, start, direction, flux, is_aimed: aim.is_some() };
+        // A direction of infinite pdf carries no flux.
+        (flux != Vec3::ZERO).then_some(emitted)
+    }
+
+    /// Generates a photon from one light; it is aimed if `targets` is given.
+    fn sample_photon(
+        &self,
+        number: usize,
+        targets: Option<&Targets>,
+        u: &PhotonNumbers,
+    ) -> Option<PhotonSample> {
+        let source = &self.sources[number];
+        match self.lights.get(number as u32).family() {
+            LightFamily::Delta(light) => {
+                let sends = EmissionProfile::Light { light, spread: source.spread };
+                let PointLight { position, intensity, .. } = *light.isotropic();
+                let (direction, ratio) =
+                    self.sample_direction_from(position, &sends, targets, u, || light.direction(u.direction));
+                let flux = intensity * source.spread as f32;
+                Some(PhotonSample { start: PhotonOrigin::Point(position.as_vec3()), direction, flux, ratio })
+            }
+            LightFamily::Infinite(light) => {
+                let (to_light, irradiance) = light.sample_direction(u.direction);
+                self.photon_from_infinity(to_light, irradiance, targets, u)
+            }
+            LightFamily::Area(light) => {
+                let place = source.surface.as_ref()?.place(light, u.light[1], Vec2::from_array(u.position));
+                let normal = place.normal.as_vec3();
+                let by_cosine = || Frame::from_normal(normal).to_world(warp::cosine(u.direction));
+                let (direction, ratio) = self.sample_direction_from(
+                    place.from,
+                    &EmissionProfile::Front(place.normal),
+                    targets,
+                    u,
+                    by_cosine,
+                );
+                let start = PhotonOrigin::Surface { point: place.point, error: place.error, normal };
+                // Apply the clear coat's transmittance in this direction.
+                let left = |texture: &EmissionTexture| {
+                    texture.coat_transmittance(place.point, place.primitive, -direction)
+                };
+                let flux = place.flux * light.texture.as_deref().map_or(1.0, left);
+                Some(PhotonSample { start, direction, flux, ratio })
+            }
+        }
+    }
+}
+
+/// A photon from one light, before accounting for the probability of the light.
+struct PhotonSample {
+    start: PhotonOrigin,
+    direction: Vec3,
+    /// Flux if all photons came from this light and none were aimed.
+    flux: Vec3,
+    /// Pdf of aimed photons divided by that of unaimed ones.
+    ratio: f64,
+}
+
+impl PhotonSource {
+    /// Samples a direction from a point; returns it with the pdf of aimed directions divided by that of unaimed ones.
+    #[inline(always)]
+    fn sample_direction_from(
+        &self,
+        from: DVec3,
+        sends: &EmissionProfile<'_>,
+        targets: Option<&Targets>,
+        u: &PhotonNumbers,
+        unaimed: impl FnOnce() -> Vec3,
+    ) -> (Vec3, f64) {
+        let Some(aim) = &self.aim else { return (unaimed(), 0.0) };
+        let view = aim.targets.seen_from(from, sends);
+        match targets.and_then(|_| view.sample(u.aim[1], u.direction)) {
+            Some((direction, target)) => (direction, view.ratio(direction, Some(target))),
+            None => {
+                let direction = unaimed();
+                (direction, view.ratio(direction, None))
+            }
+        }
+    }
+
+    /// A photon from a direction at infinity, given its irradiance at normal incidence.
+    fn photon_from_infinity(
+        &self,
+        to_light: Vec3,
+        irradiance: Vec3,
+        targets: Option<&Targets>,
+        u: &PhotonNumbers,
+    ) -> Option<PhotonSample> {
+        let Frame { s, t, n } = Frame::from_normal(to_light);
+        let (s, t, n) = (s.as_dvec3(), t.as_dvec3(), n.as_dvec3());
+        let BoundingSphere { center, radius } = self.around;
+        // Project onto the plane through the sphere's center.
+        let through = |ball: &BoundingSphere| {
+            let at = warp::disk(Vec2::from_array(u.position)).as_dvec2() * ball.radius;
+            let middle = ball.center - center;
+            [middle.dot(s) + at.x, middle.dot(t) + at.y]
+        };
+        let [x, y] = match targets {
+            Some(targets) => through(targets.pick_by_disk(u.aim[1])),
+            None => through(&self.around),
+        };
+        let is_inside = targets.is_none() || x * x + y * y <= radius * radius;
+        let ratio = self.aim.as_ref().map_or(0.0, |aim| {
+            let is_on = |ball: &BoundingSphere| {
+                let middle = ball.center - center;
+                let (x, y) = (x - middle.dot(s), y - middle.dot(t));
+                x * x + y * y <= ball.radius * ball.radius
+            };
+            aim.targets.disk_density(is_on) * (PI * radius * radius)
+        });
+        let start = PhotonOrigin::Beyond((center + s * x + t * y + n * radius).as_vec3());
+        let flux = (irradiance.as_dvec3() * (PI * radius * radius)).as_vec3();
+        is_inside.then_some(PhotonSample { start, direction: -to_light, flux, ratio })
+    }
+
+    /// Estimated power of a light toward the targets, used to choose among lights.
+    fn power_toward(&self, number: u32, light: &Light, targets: &Targets) -> f64 {
+        let source = &self.sources[number as usize];
+        let power = mean_channel(source.power);
+        if !(power > 0.0) {
+            return 0.0;
+        }
+        let disk = PI * self.around.radius * self.around.radius;
+        let part = match light.family() {
+            LightFamily::Delta(light) => {
+                let sends = EmissionProfile::Light { light, spread: source.spread };
+                targets.seen_from(light.isotropic().position, &sends).total() / source.spread
+            }
+            LightFamily::Infinite(_) => targets.disk_area() / disk,
+            LightFamily::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
+                let of = |i: u32| {
+                    let (u, piece) = (places(i), (i as f32 + 0.5) / PLACES as f32);
+                    let place = surface.place(light, piece, u);
+                    let part =
+                        targets.seen_from(place.from, &EmissionProfile::Front(place.normal)).total() / PI;
+                    part.min(1.0) * mean_channel(place.flux)
+                };
+                (0..PLACES).map(of).sum::<f64>() / f64::from(PLACES) / power
+            }),
+        };
+        power * part.min(1.0)
+    }
+}
+
+/// Number of points on a light from which its view of the targets is estimated.
+const PLACES: u32 = 16;
+
+/// A low-discrepancy sequence in the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).
+fn places(i: u32) -> Vec2 {
+    let along = |step: f64| ((f64::from(i) + 0.5) * step).fract() as f32;
+    Vec2::new(along(0.754_877_666_246_693), along(0.569_840_290_998_053_3))
+}
+
+impl LightEmission {
+    fn new(
+        light: &Light,
+        emitter_geometry: &impl Fn(u32) -> Option<EmitterGeometry>,
+        around: BoundingSphere,
+    ) -> Self {
+        let disk = PI * around.radius * around.radius;
+        match light.family() {
+            LightFamily::Delta(light) => {
+                let spread = light.solid_angle();
+                let PointLight { intensity, falloff, .. } = light.isotropic();
+                let power = match falloff {
+                    Falloff::Square => (intensity.as_dvec3() * spread).as_vec3(),
+                    Falloff::None => Vec3::ZERO,
+                };
+                Self { power, spread, surface: None }
+            }
+            LightFamily::Infinite(light) => {
+                Self { power: light.power_through(disk), spread: 0.0, surface: None }
+            }
+            LightFamily::Area(light) => {
+                let surface = emitter_geometry(light.object)
+                    .and_then(|emitter_geometry| EmissiveSurface::new(light, &emitter_geometry));
+                let power = surface.as_ref().map_or(Vec3::ZERO, EmissiveSurface::power);
+                Self { power, spread: 0.0, surface }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! Samples emission points on area lights.
+
+use std::f64::consts::PI;
+
+use super::EmitterGeometry;
+use crate::geometry::surface::error;
+use crate::geometry::{AreaPoint, Shape};
+use crate::lights::area::{AreaLight, Side};
+use crate::lights::tree::bounds::mean_channel;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::distribution::Discrete;
+
+/// The surface of a light, divided into pieces that are chosen by power.
+#[derive(Clone, Debug)]
+pub struct EmissiveSurface {
+    pieces: Discrete,
+    on: PieceGeometry,
+    /// Power in W.
+    power: Vec3,
+}
+
+/// Geometry of the pieces.
+#[derive(Clone, Debug)]
+enum PieceGeometry {
+    /// A shape, each part of which is divided into side × side pieces of equal area.
+    Shape {
+        shape: Shape,
+        side: u32,
+        /// Areas of the parts.
+        areas: Vec<f64>,
+        /// The largest length from which a point is computed.
+        reach: f64,
+    },
+    /// The triangles of a mesh.
+    Mesh { rounding: f32 },
+}
+
+/// A sampled point on a light.
+pub struct EmissionPoint {
+    /// The point, rounded to `f32`.
+    pub point: Vec3,
+    /// The point in double precision.
+    pub from: DVec3,
+    /// Unit normal of the emitting side.
+    pub normal: DVec3,
+    /// Error bound of each component of `point`.
+    pub error: Vec3,
+    /// Cosine-weighted integral of the radiance, divided by the pdf of the point; its mean is the power of the light in W.
+    pub flux: Vec3,
+    /// Primitive index, for a mesh.
+    pub primitive: u32,
+}
+
+/// A point on a piece.
+struct PiecePoint {
+    point: DVec3,
+    normal: DVec3,
+    /// Area of the piece.
+    area: f64,
+    primitive: u32,
+}
+
+/// Maximum number of pieces of a textured light.
+const PIECES: usize = 1024;
+
+/// Number of texture lookups along each side of a piece.
+const LOOKUPS_PER_SIDE: u32 = 4;
+
+/// Fraction of the pieces' weight that is proportional to area, in case there is more light between the lookups.
+const BY_AREA: f64 = 0.05;
+
+impl EmissiveSurface {
+    /// Divides the surface of a light into pieces. Returns `None` if it has no area or emits nothing.
+    pub fn new(light: &AreaLight, emitter_geometry: &EmitterGeometry) -> Option<Self> {
+        let (on, count) = match emitter_geometry {
+            EmitterGeometry::Shape(shape) => {
+                let areas = shape.areas();
+                let most = if light.texture.is_some() { PIECES / areas.len().max(1) } else { 1 };
+                let side = most.isqrt().max(1);
+                let count = areas.len() * side * side;
+                (
+                    PieceGeometry::Shape { shape: *shape, side: side as u32, areas, reach: reach(shape)? },
+                    count,
+                )
+            }
+            EmitterGeometry::Mesh { rounding } => {
+                let mesh = light.shape.as_mesh()?;
+                (PieceGeometry::Mesh { rounding: *rounding }, mesh.primitives().count())
+            }
+        };
+        let per_side = if light.texture.is_some() { LOOKUPS_PER_SIDE } else { 1 };
+        let of = |index: usize| {
+            let mut sum = DVec3::ZERO;
+            let mut area = 0.0;
+            for i in 0..per_side * per_side {
+                let u = Vec2::new((i % per_side) as f32 + 0.5, (i / per_side) as f32 + 0.5) / per_side as f32;
+                let place = on.at(light, index, u);
+                area = place.area;
+                sum += radiance(light, &place).as_dvec3();
+            }
+            (area, sum * (area * PI / f64::from(per_side * per_side)))
+        };
+        let all: Vec<(f64, DVec3)> = (0..count).map(of).collect();
+        let power: DVec3 = all.iter().map(|(_, power)| *power).sum();
+        let area: f64 = all.iter().map(|(area, _)| area).sum();
+        let total = mean_channel(power.as_vec3());
+        let by_power = if total > 0.0 { (1.0 - BY_AREA) / total } else { 0.0 };
+        let weight =
+            |(own, power): &(f64, DVec3)| BY_AREA * own / area + by_power * power.element_sum() / 3.0;
+        let pieces = Discrete::new(all.iter().map(weight))?;
+        Some(Self { pieces, on, power: power.as_vec3() })
+    }
+
+    /// Power in W; for a textured light, estimated from a dense grid of points.
+    pub fn power(&self) -> Vec3 {
+        self.power
+    }
+
+    /// Samples a point, with random numbers in [0, 1).
+    pub fn place(&self, light: &AreaLight, piece: f32, u: Vec2) -> EmissionPoint {
+        let (index, _) = self.pieces.sample(piece);
+        let place = self.on.at(light, index, u);
+        let PiecePoint { point, normal, area, .. } = place;
+        let factor = PI * area / self.pieces.share(index);
+        let flux = (radiance(light, &place).as_dvec3() * factor).as_vec3();
+        let rounded = point.as_vec3();
+        let error = match self.on {
+            PieceGeometry::Shape { reach, .. } => error(rounded, reach),
+            PieceGeometry::Mesh { rounding } => error(rounded, 0.0) + Vec3::splat(rounding),
+        };
+        EmissionPoint { point: rounded, from: point, normal, error, flux, primitive: place.primitive }
+    }
+}
+
+impl PieceGeometry {
+    /// A point uniformly distributed on a piece.
+    fn at(&self, light: &AreaLight, index: usize, u: Vec2) -> PiecePoint {
+        match (self, light.shape.as_mesh()) {
+            (Self::Shape { shape, side, areas, .. }, _) => {
+                let all = *side as usize;
+                let (part, cell) = (index / (all * all), index % (all * all));
+                let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
+                let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
+                let AreaPoint { point, normal } = shape.sample(part as u32, u);
+                let normal = match light.side {
+                    Side::Front => normal,
+                    Side::Back => -normal,
+                };
+                PiecePoint { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
+            }
+            (Self::Mesh { .. }, Some(mesh)) => {
+                let (place, area, primitive) = mesh.place(index, u);
+                PiecePoint { point: place.point, normal: place.normal, area, primitive }
+            }
+            (Self::Mesh { .. }, None) => {
+                PiecePoint { point: DVec3::ZERO, normal: DVec3::Y, area: 0.0, primitive: 0 }
+            }
+        }
+    }
+}
+
+/// Radiance at a point in W·sr⁻¹·m⁻², ignoring a clear coat.
+fn radiance(light: &AreaLight, place: &PiecePoint) -> Vec3 {
+    let texture = light.texture.as_ref();
+    light.radiance
+        * texture.map_or(Vec3::ONE, |texture| texture.at_place(place.point.as_vec3(), place.primitive))
+}
+
+/// Upper bound on the lengths from which the shape's points are computed. `None` if the shape is infinite.
+fn reach(shape: &Shape) -> Option<f64> {
+    let bounds = shape.bounds()?;
+    let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();
+    Some(greatest + 2.0 * bounds.extent().as_dvec3().length())
+}

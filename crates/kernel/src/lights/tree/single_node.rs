@@ -1,0 +1,111 @@
+//! Single-node light trees, in which a packet of points picks lights together.
+
+use super::node::{LightTreeNode, NodeChild, ReceiverPacket};
+use super::{LightTree, ROOT};
+use crate::math::lanes::{F32x16, PACKET_SIZE};
+
+/// Importance of each light of a single-node tree, for a packet of points.
+pub struct SingleNodeImportance<'a> {
+    node: &'a LightTreeNode,
+    /// Importance per child, then per point.
+    importance: [F32x16; PACKET_SIZE],
+    /// Sums over the children.
+    totals: [f64; PACKET_SIZE],
+}
+
+/// The lights picked by a packet of points.
+pub struct PacketPicks {
+    /// Child index of each light.
+    children: [u32; PACKET_SIZE],
+    /// Index of each light.
+    pub lights: [u32; PACKET_SIZE],
+    /// Probabilities of the picks; 0 if no light arrives.
+    pub probabilities: F32x16,
+}
+
+impl LightTree {
+    /// Importance of the tree's lights for a packet of points. `None` if the tree has more than one node.
+    #[inline(always)]
+    pub fn single_node_importance(
+        &self,
+        receivers: &ReceiverPacket,
+        has_lobes: bool,
+    ) -> Option<SingleNodeImportance<'_>> {
+        self.is_single_node()
+            .then(|| SingleNodeImportance::new(&self.nodes[ROOT as usize], receivers, has_lobes))
+    }
+
+    /// Whether the tree is a single node.
+    #[inline(always)]
+    pub fn is_single_node(&self) -> bool {
+        self.nodes.len() == 1
+    }
+}
+
+impl<'a> SingleNodeImportance<'a> {
+    #[inline(always)]
+    fn new(node: &'a LightTreeNode, receivers: &ReceiverPacket, has_lobes: bool) -> Self {
+        let (mut importance, mut totals) = ([[0.0; PACKET_SIZE]; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for child in 0..node.count as usize % (PACKET_SIZE + 1) {
+            importance[child] = node.expected_for_child(child, receivers, has_lobes);
+            for i in 0..PACKET_SIZE {
+                totals[i] += f64::from(importance[child][i]);
+            }
+        }
+        Self { node, importance, totals }
+    }
+
+    /// Picks a light for each point, with `u` in [0, 1).
+    #[inline(always)]
+    pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> PacketPicks {
+        let mut targets = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            // Stay below the total, so that rounding cannot go past the last child with nonzero importance.
+            let (target, last) = (u[i] * self.totals[i], before(self.totals[i]));
+            targets[i] = if target < last { target } else { last };
+        }
+        let (mut sums, mut children, mut values) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for child in 0..self.node.count as usize % (PACKET_SIZE + 1) {
+            for i in 0..PACKET_SIZE {
+                let is_reached = sums[i] <= targets[i];
+                children[i] = if is_reached { child as u32 } else { children[i] };
+                values[i] = if is_reached { self.importance[child][i] } else { values[i] };
+                sums[i] += f64::from(self.importance[child][i]);
+            }
+        }
+        let mut lights = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            lights[i] = match self.node.children[children[i] as usize % PACKET_SIZE] {
+                NodeChild::Light(light) => light,
+                NodeChild::LightTreeNode(_) => 0,
+            };
+        }
+        PacketPicks { children, lights, probabilities: self.shares(&values) }
+    }
+
+    /// The probabilities with which these importances would have led to the given picks.
+    #[inline(always)]
+    pub fn probabilities(&self, picks: &PacketPicks) -> F32x16 {
+        let mut values = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            values[i] = self.importance[picks.children[i] as usize % PACKET_SIZE][i];
+        }
+        self.shares(&values)
+    }
+
+    #[inline(always)]
+    fn shares(&self, values: &F32x16) -> F32x16 {
+        let mut shares = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            let share = (f64::from(values[i]) / self.totals[i]) as f32;
+            shares[i] = if self.totals[i] > 0.0 { share } else { 0.0 };
+        }
+        shares
+    }
+}
+
+/// The largest number below `total` > 0; 0 for 0.
+#[inline(always)]
+fn before(total: f64) -> f64 {
+    f64::from_bits(total.to_bits().saturating_sub(1))
+}

@@ -1,0 +1,82 @@
+//! Dielectrics that fill a closed shape.
+
+use super::footprint::TexturePoint;
+use super::microfacet;
+use super::scalar::Number;
+use crate::math::elementary::exp2;
+use crate::math::{DVec3, Vec3};
+
+/// A smooth or rough dielectric that fills its shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dielectric {
+    /// Index of refraction inside; outside is 1.
+    pub ior: f32,
+    /// Transmittance per unit length inside, as precisely as `f32` allows.
+    pub tint: Vec3,
+    /// The square root of α; the constant 0 for smooth glass.
+    pub roughness: Number,
+    /// Absorption in halvings per unit length. In scenes with small units, the tint of colored glass would underflow `f32`; with
+    /// large units, it would round to 1.
+    density: Vec3,
+}
+
+impl Dielectric {
+    /// Smooth glass with a transmittance in [0, 1] per unit length inside.
+    pub fn new(ior: f32, tint: DVec3) -> Self {
+        // Opaque glass gets a large finite density, because ∞ · 0 would be NaN.
+        let halvings =
+            |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
+        let density = Vec3::from_array(tint.to_array().map(halvings));
+        Self { ior, tint: tint.as_vec3(), roughness: Number::Constant(0.0), density }
+    }
+
+    /// The same glass with a surface of this roughness.
+    pub fn with_roughness(self, roughness: Number) -> Self {
+        Self { roughness, ..self }
+    }
+
+    /// Whether the surface is smooth.
+    #[inline]
+    pub fn is_smooth(&self) -> bool {
+        self.roughness.constant() == Some(0.0)
+    }
+
+    /// The surface's α. `None` if it is smooth.
+    #[inline]
+    pub fn alpha(&self, at: &TexturePoint, lookups: &mut u64) -> Option<f32> {
+        (!self.is_smooth()).then(|| microfacet::alphas(self.roughness.at(at, lookups), 0.0)[0])
+    }
+
+    /// Transmittance over `distance` inside (Beer–Lambert law).
+    #[inline]
+    pub fn transmittance(&self, distance: f32) -> Vec3 {
+        if self.density == Vec3::ZERO {
+            Vec3::ONE
+        } else {
+            Vec3::from_array((self.density * distance).to_array().map(|halvings| exp2(-halvings)))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn absorption_multiplies_with_distance() {
+        let glass = Dielectric::new(1.5, DVec3::new(0.5, 1.0, 0.0));
+        assert_eq!(glass.transmittance(0.0), Vec3::ONE);
+        assert!((glass.transmittance(2.0) - Vec3::new(0.25, 1.0, 0.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn tint_is_independent_of_the_unit_of_length() {
+        let through = DVec3::new(0.3, 0.5, 0.9);
+        for thickness in [0.01, 1.0, 1e3, 1e6, 1e9] {
+            let part = |through: f64| libm::exp(libm::log(through) / thickness);
+            let tint = DVec3::new(part(through.x), part(through.y), part(through.z));
+            let found = Dielectric::new(1.5, tint).transmittance(thickness as f32).as_dvec3();
+            assert!((found - through).abs().max_element() < 2e-6, "{thickness}: {found}");
+        }
+    }
+}

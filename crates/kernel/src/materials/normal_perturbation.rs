@@ -1,0 +1,155 @@
+//! Perturbation of shading normals by normal maps and bump maps, without changing the shape.
+
+use std::sync::Arc;
+
+use super::footprint::TexturePoint;
+use super::normal_map::NormalMap;
+use super::texture::Texture;
+use crate::math::Vec3;
+
+/// A normal map, a bump map, or both.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalPerturbation {
+    /// The normals.
+    pub normal_map: Option<NormalMap>,
+    /// Heights over the surface with those normals.
+    pub bump: Option<Bump>,
+}
+
+impl NormalPerturbation {
+    /// Combines a normal map and a bump map. `None` if there is neither.
+    pub fn new(normal_map: Option<NormalMap>, bump: Option<Bump>) -> Option<Self> {
+        (normal_map.is_some() || bump.is_some()).then_some(Self { normal_map, bump })
+    }
+
+    /// The perturbed shading normal. `dpdu` and `dpdv` are ∂p/∂u and ∂p/∂v. Adds to `lookups`.
+    #[inline]
+    pub fn perturb(
+        &self,
+        at: &TexturePoint,
+        normal: Vec3,
+        [dpdu, dpdv]: [Vec3; 2],
+        lookups: &mut u64,
+    ) -> Vec3 {
+        let mut bent = normal;
+        if let Some(map) = &self.normal_map {
+            *lookups += 1;
+            bent = map.perturb(at, normal, dpdu, dpdv);
+        }
+        if let Some(bump) = &self.bump {
+            *lookups += Bump::LOOKUPS;
+            bent = bump.perturb(at, normal, bent, [dpdu, dpdv]);
+        }
+        bent
+    }
+
+    /// Its textures.
+    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
+        of_normals.into_iter().chain(self.bump.as_ref().map(|bump| &bump.texture))
+    }
+}
+
+/// A bump map: heights in the red channel of a texture (Blinn, *Simulation of Wrinkled Surfaces*, SIGGRAPH 1978).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bump {
+    /// The heights.
+    pub texture: Arc<Texture>,
+    /// Length of a height of 1. Negative values invert the relief.
+    pub scale: f32,
+}
+
+impl Bump {
+    /// Number of texture lookups per normal.
+    const LOOKUPS: u64 = 4;
+
+    /// Perturbs `bent` by the slopes of the heights over the surface with normal `normal`. If the tangents are degenerate, `bent`
+    /// is returned unchanged.
+    ///
+    /// The surface gradient ∇h is Mikkelsen's (*Surface Gradient-Based Bump Mapping Framework*, JCGT 2020, section 2): ∇h = (h_u
+    /// (p_v × n) + h_v (n × p_u)) / (n · (p_u × p_v)). Slopes add up: with the normal m of a normal map, the perturbed normal is
+    /// along m / (m · n) − ∇h.
+    fn perturb(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
+        let [dpdu, dpdv] = self.texture.tangents(at, tangents);
+        let slopes = self.texture.slopes(at) * self.scale;
+        let volume = normal.dot(dpdu.cross(dpdv));
+        let gradient = (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume;
+        (bent - gradient * bent.dot(normal)).try_normalize().unwrap_or(bent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::materials::texels::{TexelData, Texels};
+    use crate::materials::texture::{TextureFilter, Wrap};
+    use crate::math::{DVec2, Vec2};
+
+    /// A texture with one row of these values.
+    fn texture(numbers: &[Vec3]) -> Arc<Texture> {
+        let data = TexelData::Float(numbers.to_vec());
+        let texels = Arc::new(Texels { width: numbers.len() as u32, height: 1, data, unusable: 0 });
+        let (filter, wrap) = (TextureFilter::Bilinear, Wrap::Repeat);
+        Arc::new(Texture {
+            texels,
+            filter,
+            wrap,
+            repeat: Vec2::ONE,
+            mipmaps: None,
+            moved: None,
+            factor: None,
+        })
+    }
+
+    /// Heights that increase by 1 per unit of u around the center.
+    fn ramp(scale: f32) -> Bump {
+        Bump { texture: texture(&[0.0, 0.25, 0.5, 0.75].map(Vec3::splat)), scale }
+    }
+
+    fn bent(normal_perturbation: &NormalPerturbation, normal: Vec3, tangents: [Vec3; 2]) -> (Vec3, u64) {
+        let mut lookups = 0;
+        let at = TexturePoint::sharp(DVec2::new(0.5, 0.3));
+        (normal_perturbation.perturb(&at, normal, tangents, &mut lookups), lookups)
+    }
+
+    #[test]
+    fn ramps_tilt_by_slope_over_tangent_length() {
+        // (tangents, normal, scale, unnormalized expected normal)
+        let cases = [
+            ([Vec3::X, Vec3::Y], Vec3::Z, 0.5, Vec3::new(-0.5, 0.0, 1.0)),
+            ([Vec3::X * 2.0, Vec3::Y], Vec3::Z, 0.5, Vec3::new(-0.25, 0.0, 1.0)),
+            ([Vec3::X, Vec3::NEG_Y], Vec3::Z, 0.5, Vec3::new(-0.5, 0.0, 1.0)),
+            ([Vec3::X, Vec3::Y], Vec3::NEG_Z, 0.5, Vec3::new(-0.5, 0.0, -1.0)),
+            ([Vec3::X, Vec3::Y], Vec3::Z, -0.5, Vec3::new(0.5, 0.0, 1.0)),
+            // Along u + v, u does not change: the height is x − y.
+            ([Vec3::X, Vec3::new(1.0, 1.0, 0.0)], Vec3::Z, 1.0, Vec3::new(-1.0, 1.0, 1.0)),
+            // The shading normal may be tilted: only the parts of the tangents perpendicular to it count.
+            ([Vec3::new(1.0, 0.0, 0.7), Vec3::Y], Vec3::Z, 1.0, Vec3::new(-1.0, 0.0, 1.0)),
+        ];
+        for (tangents, normal, scale, expected) in cases {
+            let normal_perturbation = NormalPerturbation { normal_map: None, bump: Some(ramp(scale)) };
+            let (bent, lookups) = bent(&normal_perturbation, normal, tangents);
+            assert!((bent - expected.normalize()).length() < 1e-6, "{tangents:?} {normal}: {bent}");
+            assert_eq!(lookups, 4);
+        }
+    }
+
+    #[test]
+    fn normal_map_and_bump_slopes_add_up() {
+        let map = NormalMap { texture: texture(&[Vec3::new(0.8, 0.5, 0.9)]), strength: 1.0 };
+        let normal_perturbation = NormalPerturbation { normal_map: Some(map), bump: Some(ramp(0.5)) };
+        let (bent, lookups) = bent(&normal_perturbation, Vec3::Z, [Vec3::X, Vec3::Y]);
+        // 0.6/0.8 from the normal map, −0.5 from the ramp.
+        assert!((bent - Vec3::new(0.25, 0.0, 1.0).normalize()).length() < 1e-6, "{bent}");
+        assert_eq!(lookups, 5);
+    }
+
+    #[test]
+    fn degenerate_tangents_keep_the_normal() {
+        let normal_perturbation = NormalPerturbation { normal_map: None, bump: Some(ramp(1.0)) };
+        for tangents in [[Vec3::ZERO; 2], [Vec3::X, Vec3::X * 2.0], [Vec3::NAN, Vec3::Y], [Vec3::X, Vec3::Z]]
+        {
+            assert_eq!(bent(&normal_perturbation, Vec3::Z, tangents).0, Vec3::Z, "{tangents:?}");
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Scalar material parameters, constant or textured.
+
+use std::sync::Arc;
+
+use super::footprint::TexturePoint;
+use super::texture::Texture;
+use crate::choice;
+
+choice! {
+    /// A channel of an image.
+    pub enum Channel {
+        /// Red.
+        Red = "r",
+        /// Green.
+        Green = "g",
+        /// Blue.
+        Blue = "b",
+        /// Alpha; 1 in images without an alpha channel.
+        Alpha = "a",
+    }
+}
+
+/// Which value of a pixel a scalar texture reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PixelValue {
+    /// Its luminance.
+    Luminance,
+    /// One channel.
+    Channel(Channel),
+    /// Its alpha, or its luminance in images without an alpha channel.
+    Opacity,
+    /// [`PixelValue::Opacity`], for an image that is not a color of the material. If its alpha is 1 everywhere and all pixels are gray,
+    /// its luminance is the opacity.
+    Mask {
+        /// Whether the luminance is the opacity also if some pixels are not gray.
+        of_any_color: bool,
+    },
+}
+
+/// A scalar parameter, constant or textured.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Number {
+    /// A constant value.
+    Constant(f32),
+    /// A texture with the value in each of its channels.
+    Texture(Arc<Texture>),
+}
+
+impl Number {
+    /// The constant value. `None` for a texture.
+    pub fn constant(&self) -> Option<f32> {
+        match self {
+            Self::Constant(number) => Some(*number),
+            Self::Texture(_) => None,
+        }
+    }
+
+    /// The texture. `None` for a constant.
+    pub fn texture(&self) -> Option<&Arc<Texture>> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture(texture) => Some(texture),
+        }
+    }
+
+    /// The value at texture coordinates. Adds to `lookups`.
+    #[inline]
+    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
+        match self {
+            Self::Constant(number) => *number,
+            Self::Texture(texture) => {
+                *lookups += 1;
+                texture.lookup(at).x
+            }
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! Thin panes: two parallel glass surfaces without thickness between them.
+
+use super::fresnel::dielectric;
+use super::texture::Color;
+
+/// An infinitely thin pane. Light that it does not reflect passes undeflected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ThinDielectric {
+    /// Index of refraction of the glass, relative to the outside.
+    pub ior: f32,
+    /// Transmittance of the glass, at any angle.
+    pub tint: Color,
+}
+
+impl ThinDielectric {
+    /// Reflectance 2R/(1 + R) at a cosine of the angle of incidence, including all reflections between both sides, where R is the
+    /// reflectance of one side.
+    #[inline]
+    pub fn reflectance(&self, cosine: f32) -> f32 {
+        let (side, _) = dielectric(cosine.abs(), self.ior);
+        2.0 * side / (1.0 + side)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn pane_reflectance_sums_all_internal_bounces() {
+        let pane = ThinDielectric { ior: 1.5, tint: Color::Constant(Vec3::ONE) };
+        for degrees in [0.0_f32, 30.0, 60.0, 80.0, 89.0] {
+            let cosine = degrees.to_radians().cos();
+            let r = f64::from(dielectric(cosine, 1.5).0);
+            // R + T²R + T²R³ + …
+            let series: f64 = r + (0..2000).map(|k| (1.0 - r).powi(2) * r.powi(2 * k + 1)).sum::<f64>();
+            assert!((f64::from(pane.reflectance(cosine)) - series).abs() < 1e-6, "{degrees}");
+        }
+        // At normal incidence R = 0.04 and R' = 0.08/1.04.
+        assert!((pane.reflectance(-1.0) - 0.08 / 1.04).abs() < 1e-6);
+        assert!((pane.reflectance(0.0) - 1.0).abs() < 1e-6);
+    }
+}

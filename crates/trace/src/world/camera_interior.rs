@@ -1,0 +1,165 @@
+//! Finds the glass around a point, such as the camera or a light.
+//!
+//! A closed shape knows which points it contains. A solid made of meshes or several objects does not: rays from the point toward
+//! points on its surface vote on which side of it they start.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Hit, Object, ObjectMaterial, World};
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Aabb, Ray, ShapeHit, SurfaceRequest};
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// Minimum number of rays that vote.
+const MIN_RAYS: usize = 32;
+
+/// Lead of one side over the other that ends the vote.
+const MAJORITY: i32 = 3;
+
+/// Maximum number of other surfaces that such a ray passes through.
+const MAX_PASSED: usize = 16;
+
+/// A closed glass solid made of meshes or several objects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CompoundSolid {
+    /// The object that represents the solid.
+    pub body: u32,
+    objects: Vec<u32>,
+    /// Bounding box of its objects.
+    pub bounds: Aabb,
+    /// Whether opaque surfaces close it, so that its interior may extend beyond `bounds`.
+    pub is_covered: bool,
+}
+
+impl World {
+    /// The glass around a point at the camera: closed shapes that contain the point, and other solids that contain the camera,
+    /// each with its material.
+    pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
+        let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
+            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
+            Object::Mesh(_) => false,
+        };
+        self.lens_glass.iter().copied().filter(is_inside).chain(self.camera_solids.iter().copied())
+    }
+
+    /// Whether no part of the lens is inside a closed glass shape, and the camera is not inside any other glass solid.
+    pub fn is_camera_in_air(&self) -> bool {
+        self.lens_glass.is_empty() && self.camera_solids.is_empty()
+    }
+
+    /// Closed glass shapes whose boxes overlap the lens, with their materials.
+    pub(super) fn find_lens_glass(&self) -> Vec<(u32, u32)> {
+        let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
+        let lens = Aabb { min: eye, max: eye }.grown(lens + eye.abs() * f32::EPSILON);
+        let objects = (0_u32..).zip(self.geometry.objects());
+        let near = objects.filter_map(|(id, object)| {
+            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
+            let is_near = object.bounds().is_none_or(|bounds| bounds.meets(&lens));
+            (is_near && self.is_closed(id) && self.is_glass(material)).then_some((id, material))
+        });
+        near.collect()
+    }
+
+    /// Other glass solids that contain the camera, each with the material there.
+    pub(super) fn find_camera_solids(&self) -> Vec<(u32, u32)> {
+        let eye = self.camera.position.as_vec3();
+        let at = Aabb { min: eye, max: eye };
+        let near =
+            self.compound_solids().into_iter().filter(|body| body.is_covered || body.bounds.meets(&at));
+        near.filter_map(|body| Some((body.body, self.material_around(&body, eye, None)?))).collect()
+    }
+
+    /// Closed glass solids that are not a single closed shape.
+    pub fn compound_solids(&self) -> Vec<CompoundSolid> {
+        if !self.has_glass {
+            return Vec::new();
+        }
+        let covered = self.glass_solids.open().iter().filter(|open| open.is_covered);
+        let covered: BTreeSet<u32> = covered.map(|open| self.body(open.object)).collect();
+        let mut solids: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for object in 0..self.geometry.objects().len() as u32 {
+            let may_be_glass = match self.object_materials[object as usize] {
+                ObjectMaterial::One(material) => self.is_glass(material),
+                ObjectMaterial::OfFile { .. } => true,
+            };
+            let body = self.body(object);
+            if may_be_glass && !self.is_closed(object) && !self.is_open(body) {
+                solids.entry(body).or_default().push(object);
+            }
+        }
+        let in_parts = |(body, objects): (u32, Vec<u32>)| {
+            let bounds =
+                objects.iter().filter_map(|&object| self.geometry.objects()[object as usize].bounds());
+            let bounds = bounds.fold(Aabb::EMPTY, Aabb::union);
+            CompoundSolid { body, objects, bounds, is_covered: covered.contains(&body) }
+        };
+        solids.into_iter().map(in_parts).collect()
+    }
+
+    /// The glass material that surrounds a point, decided by most of the rays from there to the solid. `None` if the point is
+    /// outside or no ray hits the solid. If the point is on object `of`, that object does not block the rays.
+    pub fn material_around(&self, body: &CompoundSolid, point: Vec3, of: Option<u32>) -> Option<u32> {
+        let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
+        for ray in 0..MIN_RAYS.max(objects.len()) {
+            let target = self.geometry.objects()[objects[ray % objects.len()] as usize].sample_surface(ray);
+            let Some((is_back, seen)) = target.and_then(|target| self.hit_side(body, (point, of), target))
+            else {
+                continue;
+            };
+            votes += if is_back { 1 } else { -1 };
+            material = if is_back { material.or(Some(seen)) } else { material };
+            if votes.abs() == MAJORITY {
+                break;
+            }
+        }
+        material.filter(|_| votes > 0)
+    }
+
+    /// Casts a ray toward `target`; returns whether it hits the solid from behind, and the material there. `None` if it misses,
+    /// or leaves through an opaque surface that closes the solid.
+    fn hit_side(
+        &self,
+        body: &CompoundSolid,
+        (point, of): (Vec3, Option<u32>),
+        target: DVec3,
+    ) -> Option<(bool, u32)> {
+        let mut ray = Ray::new(point, (target - point.as_dvec3()).as_vec3());
+        for _ in 0..MAX_PASSED {
+            let hit = self.geometry.closest(&ray)?;
+            let material = self.material_index(&hit) as u32;
+            if body.is_covered && !self.is_glass(material) && Some(hit.object) != of {
+                return None;
+            }
+            let bare = SurfaceRequest { uv: false, shadow_point: false };
+            let surface = self.geometry.requested_surface(&ray, &hit, bare);
+            if self.is_glass(material) && self.body(hit.object) == body.body {
+                let is_back = surface.normal.dot(ray.direction) > 0.0;
+                return Some((is_back != self.glass_solids.is_inside_out(hit.object), material));
+            }
+            let origin = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
+            ray = Ray::new(origin, ray.direction);
+        }
+        None
+    }
+}
+
+impl Object {
+    /// A point on the surface; different numbers give different points. `None` if the object has no area.
+    fn sample_surface(&self, number: usize) -> Option<DVec3> {
+        match self {
+            Self::Shape(shape) => {
+                let areas = shape.areas();
+                let parts: Vec<usize> = (0..areas.len()).filter(|&part| areas[part] > 0.0).collect();
+                let part = *parts.get(number % parts.len().max(1))?;
+                let u = Vec2::new(0.618_034, 0.754_877_7) * (number as f32 + 0.5);
+                Some(shape.sample(part as u32, u.fract()).point)
+            }
+            Self::Mesh(mesh) => {
+                let count = mesh.triangle_count();
+                let triangle = (number * 7919).checked_rem(count)?;
+                let [a, b, c] = mesh.world_corners(triangle as u32);
+                Some(a * 0.39 + b * 0.33 + c * 0.28)
+            }
+        }
+    }
+}

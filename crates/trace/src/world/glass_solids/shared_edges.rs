@@ -1,0 +1,250 @@
+//! Shared edges: rim edges of the same glass that close each other, with the same endpoints and opposite directions.
+
+use super::parts::{GlassId, GlassPart, RimEdge};
+use crate::accel::Bvh;
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::Aabb;
+use crate::math::DVec3;
+
+/// Angle in radians within which surfaces that share an edge coincide.
+const SAME_ANGLE: f64 = 1e-3;
+
+/// A rim edge with the ids of its endpoints.
+pub(super) type OpenEdge = (RimEdge, [u32; 2]);
+
+/// Two parts that close each other along an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SharedEdge {
+    /// Both edges, with the ids of their endpoints.
+    pub rims: [OpenEdge; 2],
+    /// Whether the parts' fronts are on opposite sides.
+    pub disagrees: bool,
+}
+
+/// Matched edges, and those left open.
+#[derive(Debug, Default)]
+pub(super) struct SharedEdges {
+    pub joined: Vec<SharedEdge>,
+    /// Edges that nothing closes, with the ids of their endpoints.
+    pub open: Vec<OpenEdge>,
+}
+
+/// A rim edge normalized for matching.
+#[derive(Clone, Copy)]
+struct HalfEdge {
+    /// The endpoints, the lower id first.
+    places: [u32; 2],
+    /// Whether the edge runs from the higher to the lower id.
+    is_back: bool,
+    substance: GlassId,
+    rim: RimEdge,
+}
+
+impl HalfEdge {
+    fn open(&self) -> OpenEdge {
+        let [low, high] = self.places;
+        (self.rim, if self.is_back { [high, low] } else { [low, high] })
+    }
+}
+
+impl SharedEdge {
+    /// The two parts.
+    pub fn parts(&self) -> [u32; 2] {
+        self.rims.map(|(rim, _)| rim.part)
+    }
+}
+
+impl SharedEdges {
+    /// Matches rim edges. Where more than two share an edge, those with glass between them close each other.
+    pub fn between(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+        let mut edges = Self::default();
+        let sites = EdgeEndpoints::of(parts, rims, token)?;
+        // Match edges with both endpoints in common.
+        let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.of_rim(i)));
+        let open = edges.join(parts, halves.collect());
+        token.check()?;
+        // Split the rest at the endpoints of others, and match again.
+        let split = sites.cut(parts, &open, token)?;
+        edges.open = edges.join(parts, split);
+        Ok(edges)
+    }
+
+    /// Matches edges of the same glass with the same endpoints; returns the rest.
+    fn join(&mut self, parts: &[GlassPart], rims: Vec<OpenEdge>) -> Vec<OpenEdge> {
+        let half = |(rim, [from, to]): OpenEdge| HalfEdge {
+            places: [from.min(to), from.max(to)],
+            is_back: from > to,
+            substance: parts[rim.part as usize].substance,
+            rim,
+        };
+        let mut halves: Vec<HalfEdge> = rims.into_iter().map(half).collect();
+        halves.retain(|half| half.places[0] != half.places[1]);
+        // Ties are broken by file order: the sort is stable.
+        halves.sort_by_key(|half| (half.places, half.substance, half.is_back, half.rim.part));
+        let mut open = Vec::new();
+        let is_same =
+            |one: &HalfEdge, other: &HalfEdge| (one.places, one.substance) == (other.places, other.substance);
+        for same in halves.chunk_by(is_same) {
+            let mut is_closed = vec![false; same.len()];
+            let mut close = |i: usize, j: usize, disagrees: bool| {
+                self.joined.push(SharedEdge { rims: [same[i], same[j]].map(|half| half.open()), disagrees });
+                (is_closed[i], is_closed[j]) = (true, true);
+            };
+            match *same {
+                [one, other] if one.is_back != other.is_back => close(0, 1, false),
+                [one, other] if one.rim.part != other.rim.part => close(0, 1, true),
+                [_] | [_, _] => {}
+                _ => around(same).for_each(|[i, j]| close(i, j, false)),
+            }
+            let left = same.iter().zip(is_closed).filter(|(_, is_closed)| !is_closed);
+            open.extend(left.map(|(half, _)| half.open()));
+        }
+        open
+    }
+}
+
+/// Pairs of edges with glass between them: going around the common edge, a surface whose back faces forward, followed by one
+/// whose back faces backward.
+fn around(same: &[HalfEdge]) -> impl Iterator<Item = [usize; 2]> {
+    let ends =
+        |half: &HalfEdge| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
+    let [from, to] = ends(&same[0]);
+    let axis = (to - from).normalize_or_zero();
+    let beside = |half: &HalfEdge| {
+        let inner = half.rim.inner - from;
+        inner - axis * inner.dot(axis)
+    };
+    let first = beside(&same[0]).normalize_or_zero();
+    let second = axis.cross(first);
+    let angle = |half: &HalfEdge| {
+        let inner = beside(half);
+        let angle = libm::atan2(inner.dot(second), inner.dot(first));
+        let angle = if angle < 0.0 { angle + std::f64::consts::TAU } else { angle };
+        // Angle 0 must not fall between coincident surfaces.
+        if angle > std::f64::consts::TAU - SAME_ANGLE { 0.0 } else { angle }
+    };
+    let mut order: Vec<(f64, usize)> = same.iter().enumerate().map(|(i, half)| (angle(half), i)).collect();
+    order.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+    // Where surfaces coincide, one solid ends before the next begins.
+    for together in order.chunk_by_mut(|one, other| other.0 - one.0 < SAME_ANGLE) {
+        together.sort_by_key(|&(_, i)| (same[i].is_back, i));
+    }
+    let order: Vec<usize> = order.into_iter().map(|(_, i)| i).collect();
+    let is_back: Vec<bool> = same.iter().map(|half| half.is_back).collect();
+    (0..order.len())
+        .map(move |at| [order[at], order[(at + 1) % order.len()]])
+        .filter(move |&[begin, end]| is_back[begin] && !is_back[end])
+}
+
+/// Endpoints of rim edges, merged where they coincide within rounding.
+struct EdgeEndpoints {
+    points: Vec<DVec3>,
+    tolerances: Vec<f64>,
+    /// Endpoint ids of each edge.
+    ends: Vec<[u32; 2]>,
+}
+
+impl EdgeEndpoints {
+    fn of(parts: &[GlassPart], rims: &[RimEdge], token: &CancelToken) -> Result<Self, Cancelled> {
+        // Merge identical points first.
+        let point = |end: usize| rims[end / 2].ends[end % 2];
+        let mut order: Vec<usize> = (0..2 * rims.len()).collect();
+        let compare = |&one: &usize, &other: &usize| {
+            let (p, q) = (point(one), point(other));
+            p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z)).then(one.cmp(&other))
+        };
+        order.sort_unstable_by(compare);
+        let (mut points, mut tolerances) = (Vec::new(), Vec::new());
+        let mut number = vec![0_usize; order.len()];
+        for end in order {
+            let (own, tolerance) = (point(end), parts[rims[end / 2].part as usize].tolerance);
+            if points.last() == Some(&own) {
+                let last = tolerances.len() - 1;
+                tolerances[last] = f64::max(tolerances[last], tolerance);
+            } else {
+                points.push(own);
+                tolerances.push(tolerance);
+            }
+            number[end] = points.len() - 1;
+        }
+        // Then merge points within tolerance of each other.
+        let mut same: Vec<u32> = (0..points.len() as u32).collect();
+        let tree = Bvh::build(&boxes(&points, &tolerances), token)?;
+        for (i, (own, tolerance)) in points.iter().zip(&tolerances).enumerate() {
+            tree.meeting(&around_point(*own, *tolerance), |j| {
+                let reach = tolerance + tolerances[j as usize];
+                if (j as usize) < i && own.distance_squared(points[j as usize]) <= reach * reach {
+                    let (one, other) = (root(&mut same, i as u32), root(&mut same, j));
+                    same[one.max(other) as usize] = one.min(other);
+                }
+            });
+        }
+        let mut site = |end: usize| root(&mut same, number[end] as u32);
+        let ends = (0..rims.len()).map(|rim| [site(2 * rim), site(2 * rim + 1)]).collect();
+        Ok(Self { points, tolerances, ends })
+    }
+
+    fn of_rim(&self, rim: usize) -> [u32; 2] {
+        self.ends[rim]
+    }
+
+    /// Splits edges at endpoints of other edges that are on them.
+    fn cut(
+        &self,
+        parts: &[GlassPart],
+        rims: &[OpenEdge],
+        token: &CancelToken,
+    ) -> Result<Vec<OpenEdge>, Cancelled> {
+        let mut ends: Vec<u32> = rims.iter().flat_map(|&(_, ends)| ends).collect();
+        ends.sort_unstable();
+        ends.dedup();
+        let points: Vec<DVec3> = ends.iter().map(|&end| self.points[end as usize]).collect();
+        let tolerances: Vec<f64> = ends.iter().map(|&end| self.tolerances[end as usize]).collect();
+        let tree = Bvh::build(&boxes(&points, &tolerances), token)?;
+        let mut split = Vec::with_capacity(rims.len());
+        for &(rim, [first, last]) in rims {
+            let [from, to] = rim.ends;
+            let tolerance = parts[rim.part as usize].tolerance;
+            let way = to - from;
+            let mut cuts = Vec::new();
+            tree.meeting(
+                &Aabb::around_f64([from, to]).grown(crate::math::Vec3::splat(tolerance as f32)),
+                |i| {
+                    let (site, point) = (ends[i as usize], points[i as usize]);
+                    let along = (point - from).dot(way) / way.length_squared();
+                    let off = (from + way * along).distance(point);
+                    if off <= tolerance + tolerances[i as usize] && along > 0.0 && along < 1.0 {
+                        cuts.push((along, site));
+                    }
+                },
+            );
+            cuts.retain(|&(_, site)| site != first && site != last);
+            cuts.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+            let mut begin = (0.0, first);
+            for end in cuts.into_iter().chain([(1.0, last)]) {
+                let ends = [begin, end].map(|(along, _)| from + way * along);
+                split.push((RimEdge { ends, ..rim }, [begin.1, end.1]));
+                begin = end;
+            }
+        }
+        Ok(split)
+    }
+}
+
+fn boxes(points: &[DVec3], tolerances: &[f64]) -> Vec<Aabb> {
+    points.iter().zip(tolerances).map(|(&point, &tolerance)| around_point(point, tolerance)).collect()
+}
+
+fn around_point(point: DVec3, tolerance: f64) -> Aabb {
+    Aabb::around_f64([point - tolerance, point + tolerance])
+}
+
+/// Finds the lowest number in a set of joined items (union-find with path halving).
+pub(super) fn root(same: &mut [u32], of: u32) -> u32 {
+    let mut at = of;
+    while same[at as usize] != at {
+        same[at as usize] = same[same[at as usize] as usize];
+        at = same[at as usize];
+    }
+    at
+}

@@ -1,0 +1,298 @@
+//! Surface attributes of a mesh for all hits of a packet.
+
+use super::MeshInstance;
+use super::placement::{IdentityPlacement, MeshPlacement};
+use super::triangle_point::PlacedMesh;
+use crate::accel::PACKET_SIZE;
+use crate::geometry::packet::{HitPacket, RayPacket, lanes};
+use crate::geometry::surface_packet::SurfacePacket;
+use crate::materials::UvSet;
+use crate::math::lanes::{Simd, TRUE, Vec3x16, lane, set_lane};
+use crate::math::{Vec2, Vec3};
+
+impl MeshInstance {
+    /// Computes the surfaces of the hits in `of`, which must all be on this instance, with UVs of the requested set if any.
+    #[inline(always)]
+    pub fn fill_surfaces(
+        &self,
+        surface: &mut SurfacePacket,
+        rays: &RayPacket,
+        hits: &HitPacket,
+        of: u32,
+        asked_uvs: Option<UvSet>,
+        simd: impl Simd,
+    ) {
+        let at = (rays, hits);
+        if self.is_transformed {
+            self.fill_placed(self.placed(&self.transform), surface, at, of, asked_uvs, simd);
+        } else {
+            self.fill_placed(self.placed(IdentityPlacement), surface, at, of, asked_uvs, simd);
+        }
+    }
+
+    #[inline(always)]
+    fn fill_placed(
+        &self,
+        placed: PlacedMesh<impl MeshPlacement>,
+        surface: &mut SurfacePacket,
+        (rays, hits): (&RayPacket, &HitPacket),
+        of: u32,
+        asked_uvs: Option<UvSet>,
+        simd: impl Simd,
+    ) {
+        let mesh = &self.tree.loaded().mesh;
+        // Other lanes get a copy of some triangle; their results are discarded.
+        let filler = hits.primitive[of.trailing_zeros() as usize % PACKET_SIZE];
+        let mut vertices = [[0; 3]; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            let triangle = if of & 1 << i != 0 { hits.primitive[i] } else { filler };
+            vertices[i] = mesh.triangles[triangle as usize];
+        }
+        let corners = of_vertices(&vertices, &mesh.positions);
+        let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
+        let (mut found, mut doubtful) = (SurfacePacket::EMPTY, [0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
+            let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+            set_lane(&mut found.point, i, facet.point);
+            set_lane(&mut found.error, i, facet.error);
+            set_lane(&mut found.normal, i, facet.normal);
+            doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
+        }
+        // Hits near an edge or in a huge triangle are rare: handle them one by one.
+        let doubtful = simd.movemask(&doubtful) & of;
+        for i in lanes(doubtful) {
+            let uv = [hits.u[i], hits.v[i]];
+            let [point, error] =
+                placed.corrected(&placed.facet(corners_of(i), uv), &rays.ray(i).to_f64(), uv);
+            set_lane(&mut found.point, i, point);
+            set_lane(&mut found.error, i, error);
+        }
+        surface.take(of, &found);
+        if self.smooth {
+            let normals = of_vertices(&vertices, self.tree.normals());
+            let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
+            for i in 0..PACKET_SIZE {
+                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                set_lane(&mut found.shading_normal, i, placed.shading_normal(&facet, &normals_of(i)));
+            }
+            for i in 0..PACKET_SIZE {
+                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                let direction = lane(&rays.direction, i).as_dvec3();
+                let lifted = placed.shadow_point(&facet, &normals_of(i), direction);
+                set_lane(&mut found.shadow_point, i, lifted);
+            }
+            for i in lanes(doubtful) {
+                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                if placed.is_on_ray(&facet, &rays.ray(i).to_f64()) {
+                    set_lane(&mut found.shadow_point, i, lane(&found.point, i));
+                }
+            }
+            surface.take_smooth(of, &found);
+        }
+        if let Some(set) = asked_uvs {
+            let all = self.uvs(set);
+            for i in 0..PACKET_SIZE {
+                let uvs = match all {
+                    [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
+                    uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
+                };
+                let uv = uv_between(uvs, Vec3::new(1.0 - hits.u[i] - hits.v[i], hits.u[i], hits.v[i]));
+                let is_own = of & 1 << i != 0;
+                surface.uv[0][i] = if is_own { f64::from(uv.x) } else { surface.uv[0][i] };
+                surface.uv[1][i] = if is_own { f64::from(uv.y) } else { surface.uv[1][i] };
+            }
+        }
+    }
+}
+
+/// Interpolates the UVs of a triangle's corners.
+#[inline(always)]
+pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
+    a * barycentric.x + b * barycentric.y + c * barycentric.z
+}
+
+/// Attributes of the triangles' first, second and third vertices.
+#[inline(always)]
+fn of_vertices(vertices: &[[u32; 3]; PACKET_SIZE], all: &[Vec3]) -> [Vec3x16; 3] {
+    let mut each = [[[0.0; PACKET_SIZE]; 3]; 3];
+    for i in 0..PACKET_SIZE {
+        for corner in 0..3 {
+            set_lane(&mut each[corner], i, all[vertices[i][corner] as usize]);
+        }
+    }
+    each
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::accel::{InstructionSet, SimdKernel};
+    use crate::assets::LoadedMesh;
+    use crate::control::CancelToken;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::geometry::{Ray, ShapeHit, SurfaceRequest};
+    use crate::math::DVec3;
+    use crate::math::random::signed as random;
+    use crate::math::transform::Transform;
+    use crate::scene::description::Accel;
+    use crate::world::MeshTree;
+
+    struct FillSurfaces<'a> {
+        mesh: &'a MeshInstance,
+        rays: &'a [Ray],
+        hits: &'a HitPacket,
+        of: u32,
+        set: UvSet,
+    }
+
+    impl SimdKernel for FillSurfaces<'_> {
+        type Output = SurfacePacket;
+
+        #[inline(always)]
+        fn run(self, simd: impl Simd) -> SurfacePacket {
+            let mut surface = SurfacePacket::EMPTY;
+            let (rows, _) = RayPacket::new(self.rays);
+            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set), simd);
+            surface
+        }
+    }
+
+    /// Triangles of all sizes with random normals, one of them zero.
+    fn meshes() -> Vec<MeshInstance> {
+        let mut next = random(5);
+        let mut vector = || Vec3::new(next(), next(), next());
+        let mut mesh = TriangleMesh {
+            positions: (0..60).map(|_| vector()).collect(),
+            normals: (0..60).map(|_| vector().normalize()).collect(),
+            triangles: (0..20).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            ..TriangleMesh::default()
+        };
+        mesh.normals[4] = Vec3::ZERO;
+
+        let with_uvs = TriangleMesh {
+            uvs: (0..60).map(|i| Vec2::new(i as f32 * 0.3, -(i as f32))).collect(),
+            ..mesh.clone()
+        };
+        let with_both = TriangleMesh {
+            second_uvs: (0..60).map(|i| Vec2::new(-(i as f32), i as f32 * 0.7)).collect(),
+            ..with_uvs.clone()
+        };
+        let placed = |scale: DVec3| {
+            Transform::scale_rotate_translate(
+                scale,
+                DVec3::new(20.0, 50.0, -10.0),
+                DVec3::new(0.3, 8.0, -2.0),
+            )
+        };
+        let mut instances = Vec::new();
+        for mesh in [mesh, with_uvs, with_both] {
+            let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+            let tree = Arc::new(tree);
+            for transform in
+                [Transform::IDENTITY, placed(DVec3::splat(1.3)), placed(DVec3::new(0.2, -1.0, 3.0))]
+            {
+                for smooth in [false, true] {
+                    instances.push(MeshInstance::new(Arc::clone(&tree), transform, smooth));
+                }
+            }
+        }
+        instances
+    }
+
+    #[test]
+    fn points_of_huge_triangles_are_on_their_rays() {
+        for size in [1e5_f32, 1e7, 1e9] {
+            let at = |x: f32, z: f32| Vec3::new(x * size, 0.0, z * size);
+            let mesh = TriangleMesh {
+                positions: vec![at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+                ..TriangleMesh::default()
+            };
+            let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+            let tree = Arc::new(tree);
+            let turned = Transform::scale_rotate_translate(DVec3::ONE, DVec3::Y * 30.0, DVec3::Y * 0.25);
+            for (mesh, height) in [
+                (MeshInstance::new(Arc::clone(&tree), Transform::IDENTITY, false), 0.0),
+                (MeshInstance::new(Arc::clone(&tree), Transform::IDENTITY, true), 0.0),
+                (MeshInstance::new(tree, turned, true), 0.25),
+            ] {
+                let mut next = random(3);
+                // Let every other ray start above the edge that the two triangles share.
+                let ray = |i: usize| {
+                    let [x, z] = if i.is_multiple_of(2) { [0.5, 0.5] } else { [next(), next()] };
+                    Ray::new(Vec3::new(x, 1.0 + height, z), Vec3::new(next() * 0.5, -1.0, next() * 0.5))
+                };
+                let rays: Vec<Ray> = (0..PACKET_SIZE).map(ray).collect();
+                let mut hits = HitPacket::none();
+                for (i, ray) in rays.iter().enumerate() {
+                    let hit = mesh.tree.triangles().closest(&mesh.local_ray(ray)).expect("the ground");
+                    hits.put(i, &hit);
+                }
+                let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);
+                let filling = FillSurfaces { mesh: &mesh, rays: &rays, hits: &hits, of, set };
+                let row = InstructionSet::best().run(filling);
+                for (i, ray) in rays.iter().enumerate() {
+                    let exact = ray.origin.as_dvec3() + ray.direction.as_dvec3();
+                    let surface =
+                        mesh.surface(&ray.to_f64(), &hits.get(i).expect("a hit"), SurfaceRequest::ALL);
+                    let off = (surface.point.as_dvec3() - exact).abs().max_element();
+                    assert!(off < 2e-6 + f64::from(size) * 1e-14, "{size}: {off}");
+                    assert!(surface.error.y < 2e-5 + size * 1e-14, "{size}: {}", surface.error);
+                    assert_eq!(surface.shadow_point, surface.point);
+                    assert_eq!([lane(&row.point, i), lane(&row.error, i)], [surface.point, surface.error]);
+                    assert!(!mesh.smooth || lane(&row.shadow_point, i) == surface.shadow_point);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn packet_surfaces_equal_single_surfaces() {
+        let mut next = random(9);
+        let number = |x: f32| (x * 0.5 + 0.5).clamp(0.0, 0.999);
+        for mesh in meshes() {
+            for round in 0..40_u32 {
+                let rays: Vec<Ray> = (0..PACKET_SIZE)
+                    .map(|_| Ray::new(Vec3::splat(9.0), Vec3::new(next(), next(), next()).normalize()))
+                    .collect();
+                let mut hits = HitPacket::none();
+                for i in 0..PACKET_SIZE {
+                    let (u, v) = (number(next()), number(next()));
+                    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                    let primitive = (number(next()) * 20.0) as u32;
+                    hits.put(i, &ShapeHit { t: 1.0, primitive, u, v });
+                }
+                let of = round.wrapping_mul(0x9e37_79b9) >> 16 | 1 << (round % 16);
+                for (instructions, set) in InstructionSet::ALL
+                    .into_iter()
+                    .flat_map(|one| [UvSet::First, UvSet::Second].map(|set| (one, set)))
+                {
+                    let row =
+                        instructions.run(FillSurfaces { mesh: &mesh, rays: &rays, hits: &hits, of, set });
+                    assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
+                    for i in (0..PACKET_SIZE).filter(|i| of & 1 << i != 0) {
+                        let hit = hits.get(i).expect("a hit");
+                        let alone = mesh.surface(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
+                        let bits = |v: Vec3| v.to_array().map(f32::to_bits);
+                        let what = || format!("{instructions:?}, {hit:?}, {alone:?}");
+                        assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());
+                        assert_eq!(bits(lane(&row.error, i)), bits(alone.error), "{}", what());
+                        assert_eq!(bits(lane(&row.normal, i)), bits(alone.normal), "{}", what());
+                        let second = mesh.second_parameterization(&hit).filter(|_| set == UvSet::Second);
+                        let uv = second.map_or(alone.uv, |(uv, _)| uv.as_dvec2());
+                        assert_eq!([row.uv[0][i], row.uv[1][i]], uv.to_array(), "{}", what());
+                        if mesh.smooth {
+                            let (normal, shadow) = (lane(&row.shading_normal, i), lane(&row.shadow_point, i));
+                            assert_eq!(bits(normal), bits(alone.shading_normal), "{}", what());
+                            assert_eq!(bits(shadow), bits(alone.shadow_point), "{}", what());
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Null interactions along shadow rays: thin panes and partial opacity let light through undeflected.
+//!
+//! Shadow rays are first tested against opaque objects only, as in a scene without such surfaces. Only unoccluded rays that enter
+//! the box of a see-through object are then followed from surface to surface.
+
+use super::packet::Occluders;
+use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
+use crate::accel::{AnyTest, F32x16};
+use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Ray, SurfaceRequest};
+use crate::lights::{LightObject, LightObjectPacket};
+use crate::materials::{Footprint, Material};
+use crate::math::Vec3;
+use crate::math::lanes::{Simd, Vec3x16, set_lane};
+
+/// Relative tolerance for equal distances.
+const SAME_DISTANCE: f32 = 1e-4;
+
+/// Maximum number of null interactions per ray; a further one blocks it.
+pub const MAX_NULL_INTERACTIONS: u32 = 64;
+
+/// Objects that light may pass undeflected.
+#[derive(Debug)]
+pub(super) struct SeeThrough {
+    /// Whether each object is see-through.
+    objects: Vec<bool>,
+    /// Whether any of them is in the tree of merged meshes.
+    is_any_merged: bool,
+}
+
+impl SeeThrough {
+    /// Collects the world's see-through objects. `None` if there are none.
+    pub(super) fn of(world: &World) -> Option<Self> {
+        let geometry = &world.geometry;
+        let has_null_interaction =
+            |object: u32| world.materials_of(object).any(Material::has_null_interaction);
+        let objects: Vec<bool> = (0..geometry.objects().len() as u32).map(has_null_interaction).collect();
+        let is_merged =
+            |(object, is_see_through): (u32, &bool)| *is_see_through && geometry.is_merged(object);
+        let is_any_merged = (0..).zip(&objects).any(is_merged);
+        objects.contains(&true).then_some(Self { objects, is_any_merged })
+    }
+
+    /// Whether light may pass an object undeflected. The id of the merged meshes is out of range and returns false.
+    #[inline(always)]
+    fn has(&self, object: u32) -> bool {
+        self.objects.get(object as usize).copied().unwrap_or(false)
+    }
+}
+
+/// Transmittance along the shadow rays of a packet.
+pub struct Transmittance {
+    /// Mask of rays with zero transmittance.
+    pub occluded: u32,
+    /// Transmittance of each ray.
+    pub left: Vec3x16,
+    /// Number of texture lookups.
+    pub lookups: u64,
+}
+
+impl World {
+    /// Whether any surface may be a null interaction.
+    #[inline(always)]
+    pub fn has_see_through(&self) -> bool {
+        self.see_through.is_some()
+    }
+
+    /// Transmittance along a packet of shadow rays, each with its light. `traced` is the mask of rays to trace.
+    #[cold]
+    #[inline(never)]
+    pub fn transmittance_packet(
+        &self,
+        rows: &RayPacket,
+        ends: &F32x16,
+        traced: u32,
+        sources: &LightObjectPacket,
+    ) -> Transmittance {
+        self.geometry.instructions().run(TransmittanceKernel { world: self, rows, ends, traced, sources })
+    }
+
+    /// Whether a shadow ray's transmittance is zero.
+    pub fn is_dark(&self, ray: &Ray, source: LightObject) -> bool {
+        self.transmittance(ray, source, &mut 0) == Vec3::ZERO
+    }
+
+    /// Transmittance along a shadow ray to its light.
+    pub fn transmittance(&self, ray: &Ray, source: LightObject, lookups: &mut u64) -> Vec3 {
+        let Some(see_through) = &self.see_through else {
+            return if self.geometry.occluded(ray, source) { Vec3::ZERO } else { Vec3::ONE };
+        };
+        let is_own = |object: u32| source == LightObject::Object(object);
+        let stops = |object: u32| !see_through.has(object) && !is_own(object);
+        if self.geometry.closest_of(ray, stops).is_some() {
+            return Vec3::ZERO;
+        }
+        self.see_through_transmittance(see_through, ray, source, lookups)
+    }
+
+    /// Transmittance of the surface at a hit, and the ray continued beyond it.
+    pub fn beyond(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
+        let index = self.material_index(hit);
+        let material = &self.materials[index];
+        let asked = SurfaceRequest { uv: self.is_textured(index), shadow_point: false };
+        let surface = self.geometry.requested_surface(ray, hit, asked);
+        let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
+        let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);
+        let at = self.texture_point(hit, &surface, |_| Footprint::POINT);
+        let left = material.null_transmittance(&at, color, cosine, lookups);
+        let origin = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
+        let start = self.geometry.triangle_number(hit);
+        let beyond = Ray::new(origin, ray.direction).leaving(start);
+        (left, Ray { t_max: ray.t_max - hit.shape.t, ..beyond })
+    }
+
+    /// Product of the transmittances of all see-through surfaces along a shadow ray.
+    fn see_through_transmittance(
+        &self,
+        see_through: &SeeThrough,
+        ray: &Ray,
+        source: LightObject,
+        lookups: &mut u64,
+    ) -> Vec3 {
+        let (mut left, mut ray, mut count) = (Vec3::ONE, *ray, 0);
+        let is_own = |object: u32| source == LightObject::Object(object);
+        // The sampled point may be at the end of the ray, within rounding.
+        let end = SAME_DISTANCE * ray.t_max;
+        while let Some(hit) =
+            self.geometry.closest_of(&ray, |object| see_through.has(object) && !is_own(object))
+        {
+            if source == LightObject::SeeThrough(hit.object) && hit.shape.t >= ray.t_max - end {
+                break;
+            }
+            let (part, beyond) = self.beyond(&ray, &hit, lookups);
+            ray = beyond;
+            // A light does not occlude itself.
+            if source == LightObject::Primitive(hit.object, hit.shape.primitive) {
+                continue;
+            }
+            (left, count) = (left * part, count + 1);
+            if left == Vec3::ZERO || count > MAX_NULL_INTERACTIONS {
+                return Vec3::ZERO;
+            }
+            if !(ray.t_max > 0.0) {
+                break;
+            }
+        }
+        left
+    }
+}
+
+/// Kernel of [`World::transmittance_packet`].
+struct TransmittanceKernel<'a> {
+    world: &'a World,
+    rows: &'a RayPacket,
+    ends: &'a F32x16,
+    traced: u32,
+    sources: &'a LightObjectPacket,
+}
+
+impl SimdKernel for TransmittanceKernel<'_> {
+    type Output = Transmittance;
+
+    #[inline(always)]
+    fn run(self, simd: impl Simd) -> Transmittance {
+        let Self { world, rows, ends, traced, sources } = self;
+        let mut transmittance = Transmittance { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
+        let Some(see_through) = &world.see_through else { return transmittance };
+        // Find the rays that no opaque object blocks.
+        let geometry: &Geometry = &world.geometry;
+        let each_mesh = see_through.is_any_merged || traced & geometry.to_whole_merged(sources) != 0;
+        let tree = if each_mesh { geometry.tree() } else { geometry.visited() };
+        let occluders = Occluders::new(geometry, rows, sources, simd);
+        let mut solid = OpaqueOccluders { occluders, see_through, near: 0 };
+        transmittance.occluded = tree.any_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
+        // Follow the rays that may cross see-through surfaces.
+        for lane in lanes(traced & !transmittance.occluded & solid.near) {
+            let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
+            let left = world.see_through_transmittance(
+                see_through,
+                &ray,
+                sources.source(lane),
+                &mut transmittance.lookups,
+            );
+            set_lane(&mut transmittance.left, lane, left);
+            transmittance.occluded |= u32::from(left == Vec3::ZERO) << lane;
+        }
+        transmittance
+    }
+}
+
+/// Any-hit test for opaque occluders.
+struct OpaqueOccluders<'a, F> {
+    occluders: Occluders<'a, F>,
+    see_through: &'a SeeThrough,
+    /// Mask of rays that enter the box of a see-through object.
+    near: u32,
+}
+
+impl<F: Simd> AnyTest for OpaqueOccluders<'_, F> {
+    #[inline(always)]
+    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
+        if self.see_through.has(id) {
+            self.near |= met;
+            return 0;
+        }
+        self.occluders.test(id, met, ends)
+    }
+}

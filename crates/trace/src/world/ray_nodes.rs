@@ -1,0 +1,40 @@
+//! Visits the tree nodes that a ray intersects.
+
+use super::{Geometry, Object};
+use crate::accel::{RayInterval, TreeNode};
+use crate::geometry::Ray;
+
+impl Geometry {
+    /// Visits the nodes of all trees whose boxes a ray intersects. `visit` receives the ray in the coordinates of the node's
+    /// tree, with t unchanged, and returns whether to descend. Depth counts through both levels: a mesh's root is one below the
+    /// leaf that contains the mesh.
+    pub fn visit_nodes(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool) {
+        let mut below = Vec::new();
+        self.visited().along(
+            ray,
+            |cell, stretch| visit(ray, cell, stretch),
+            |id, depth| below.push((id, depth)),
+        );
+        for (id, above) in below {
+            let (local, tree) =
+                match (self.merged(id), self.objects().get(id as usize).and_then(Object::mesh)) {
+                    (Some(merged), _) => (*ray, merged.tree()),
+                    (None, Some(mesh)) => (mesh.local_ray(ray), mesh.tree.triangles()),
+                    (None, None) => continue,
+                };
+            tree.along(&local, |cell, stretch| {
+                visit(&local, &TreeNode { depth: above + cell.depth, ..*cell }, stretch)
+            });
+        }
+    }
+
+    /// Traversal cost of a ray: the number of boxes it intersects, plus the shapes in those leaves and the infinite objects.
+    pub fn traversal_cost(&self, ray: &Ray) -> u32 {
+        let mut count = self.unbounded().len() as u32;
+        self.visit_nodes(ray, |_, cell, _| {
+            count += 1 + cell.shapes;
+            true
+        });
+        count
+    }
+}

@@ -1,0 +1,242 @@
+//! Points on the triangles of a mesh instance: position, error bound and normals.
+
+use super::placement::MeshPlacement;
+use crate::geometry::RayF64;
+use crate::geometry::surface::double_error;
+use crate::math::{DVec3, Vec3};
+
+/// A point on a triangle of a mesh instance.
+pub(super) struct TrianglePoint {
+    /// The triangle's corners, in mesh coordinates.
+    pub(super) corners: [DVec3; 3],
+    /// The point in mesh coordinates.
+    local: DVec3,
+    /// The point in world coordinates.
+    pub(super) point: Vec3,
+    /// [`SurfacePoint::error`].
+    pub(super) error: Vec3,
+    /// [`SurfacePoint::normal`].
+    pub(super) normal: Vec3,
+    /// Barycentric coordinates.
+    pub(super) barycentric: Vec3,
+    /// Whether the point is so close to an edge that a ray from here could start beyond a neighboring surface; see
+    /// [`PlacedMesh::pulled_inside`].
+    pub(super) is_near_edge: bool,
+    /// Whether the barycentric coordinates may be too coarse for the point; see [`PlacedMesh::on_ray`].
+    is_coarse: bool,
+}
+
+impl TrianglePoint {
+    /// Whether [`PlacedMesh::corrected`] may change the point.
+    #[inline(always)]
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.is_near_edge | self.is_coarse
+    }
+}
+
+/// If the triangle's corners are this many times farther away than the point and the ray origin, `f32` barycentric coordinates are too
+/// coarse, and the point is computed from the ray.
+const COARSE: f64 = 1024.0;
+
+/// Minimum distance from the triangle's edges, in point errors: rounding the point and offsetting it off the surface takes two.
+pub(super) const EDGE_MARGIN: f64 = 4.0;
+
+/// Whether a point with barycentric coordinate `weight` is near the opposite edge. `bound` is the squared minimum distance over
+/// the squared length of the cross product of two edges.
+#[inline(always)]
+fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
+    (weight < 0.0) | (weight * weight < bound * edge.length_squared())
+}
+
+/// Maximum distance to move a point away from an edge, as a fraction of the triangle's height.
+const MAX_EDGE_MARGIN: f64 = 0.125;
+
+/// A mesh placement, with the data its surface points need.
+#[derive(Clone, Copy)]
+pub(super) struct PlacedMesh<P> {
+    /// The mesh-to-world map.
+    pub(super) placement: P,
+    /// Minimum distance from triangle edges, as a multiple of the point error, in mesh coordinates.
+    pub(super) edge_margin: f64,
+    /// Whether rays hit triangles whose corners were rounded after the transform.
+    pub(super) has_rounded_corners: bool,
+}
+
+impl<P: MeshPlacement> PlacedMesh<P> {
+    /// Error bound of a point on a triangle: rounding of the point, of the next ray's origin in mesh coordinates, and of the
+    /// numbers from which the point is computed. If all of these are near 0, what remains is the rounding of the `f64` arithmetic
+    /// that decides on which side of the triangle a point is. In a merged tree, the rounding of the transformed corners is added.
+    #[inline(always)]
+    pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
+        let reach = self.placement.reach(local.abs());
+        let parts = point.abs() + reach.as_vec3() + self.placement.shift().abs().as_vec3();
+        let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
+        let of_double = double_error(greatest.max_element());
+        let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
+        if self.has_rounded_corners {
+            error + (greatest + self.placement.shift().abs()).as_vec3() * f32::EPSILON
+        } else {
+            error
+        }
+    }
+
+    /// The point with barycentric coordinates `u` and `v` on the triangle with these corners, in mesh coordinates.
+    #[inline(always)]
+    pub(super) fn facet(&self, corners: [Vec3; 3], [u, v]: [f32; 2]) -> TrianglePoint {
+        let corners = corners.map(|corner| corner.as_dvec3());
+        let [a, b, c] = corners;
+        let (ab, ac) = (b - a, c - a);
+        let local = a + ab * f64::from(u) + ac * f64::from(v);
+        let point = self.placement.point(local).as_vec3();
+        let error = self.error(point, local, corners);
+        let across = ab.cross(ac);
+        // Compare squared distances from the edges with the squared minimum.
+        let least = self.min_edge_distance(error, corners);
+        let bound = least * least / across.length_squared();
+        let (u, v) = (f64::from(u), f64::from(v));
+        let w = 1.0 - u - v;
+        let is_near_edge = is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound);
+        TrianglePoint {
+            corners,
+            local,
+            point,
+            error,
+            normal: self.placement.normal(across).normalize().as_vec3(),
+            barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
+            is_near_edge,
+            is_coarse: f64::from(point.abs().max_element()) * COARSE < self.greatest(corners),
+        }
+    }
+
+    /// Upper bound of the world coordinates of a triangle's corners.
+    #[inline(always)]
+    fn greatest(&self, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
+        (greatest + self.placement.shift().abs()).max_element()
+    }
+
+    /// Corrects a doubtful point: computes it from the ray or pulls it inside the triangle. Returns the point and its error.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn corrected(&self, facet: &TrianglePoint, ray: &RayF64, weights: [f32; 2]) -> [Vec3; 2] {
+        match self.on_ray(facet, ray) {
+            Some(corrected) => corrected,
+            None if facet.is_near_edge => self.pulled_inside(facet, weights),
+            None => [facet.point, facet.error],
+        }
+    }
+
+    /// Whether [`PlacedMesh::corrected`] computes the point from the ray.
+    #[inline(always)]
+    pub(super) fn is_on_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> bool {
+        facet.is_coarse && self.on_ray(facet, ray).is_some()
+    }
+
+    /// Intersection of the ray with the triangle's plane, and its error. `None` unless the triangle is much larger than the distances
+    /// of the point and the ray origin from the scene's origin.
+    fn on_ray(&self, facet: &TrianglePoint, ray: &RayF64) -> Option<[Vec3; 2]> {
+        if !facet.is_coarse {
+            return None;
+        }
+        let [a, b, c] = facet.corners;
+        let greatest = self.greatest(facet.corners);
+        let normal = self.placement.normal((b - a).cross(c - a));
+        let t = (self.placement.point(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
+        let point = ray.at(t);
+        let reach = ray.origin.abs().max(point.abs()).max_element();
+        let apart = (point - facet.point.as_dvec3()).abs().max_element();
+        let is_better = reach * COARSE < greatest && apart <= greatest * f64::from(32.0 * f32::EPSILON);
+        let rounded = point.as_vec3();
+        is_better.then(|| [rounded, self.error(rounded, facet.local, facet.corners)])
+    }
+
+    /// Minimum distance of a point from its triangle's edges, in mesh coordinates: errors of the point, plus the error of testing
+    /// a neighbor of the same size.
+    #[inline(always)]
+    fn min_edge_distance(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        self.edge_margin * f64::from(error.max_element()) + EDGE_MARGIN * f64::from(f32::EPSILON) * greatest
+    }
+
+    /// Moves a point near an edge into the triangle, beyond the minimum distance; returns the point and its error. Otherwise a
+    /// ray could start behind the wall that adjoins this one, and escape from a closed room.
+    fn pulled_inside(&self, facet: &TrianglePoint, [u, v]: [f32; 2]) -> [Vec3; 2] {
+        let [a, b, c] = facet.corners;
+        let (ab, ac) = (b - a, c - a);
+        let least = self.min_edge_distance(facet.error, facet.corners) / ab.cross(ac).length();
+        let [of_u, of_v, of_w] = [ac, ab, ac - ab].map(|edge| (least * edge.length()).min(MAX_EDGE_MARGIN));
+        let (u, v) = (f64::from(u).max(of_u), f64::from(v).max(of_v));
+        let excess = (u + v - (1.0 - of_w)).max(0.0);
+        // Lower the coordinate with more slack.
+        let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
+        let local = a + ab * u + ac * v;
+        let point = self.placement.point(local).as_vec3();
+        if !point.is_finite() {
+            return [facet.point, facet.error];
+        }
+        [point, self.error(point, local, facet.corners)]
+    }
+
+    /// Interpolated shading normal of a smooth mesh, flipped to the side of the geometric normal.
+    #[inline(always)]
+    pub(super) fn shading_normal(&self, facet: &TrianglePoint, [a, b, c]: &[Vec3; 3]) -> Vec3 {
+        let TrianglePoint { normal, barycentric, .. } = *facet;
+        let interpolated = *a * barycentric.x + *b * barycentric.y + *c * barycentric.z;
+        let bent = self.placement.normal(interpolated.as_dvec3()).as_vec3();
+        let reciprocal = bent.length_recip();
+        let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
+        let bent = bent * reciprocal;
+        let bent = if bent.dot(normal) < 0.0 { -bent } else { bent };
+        let choose = |bent: f32, normal: f32| if is_told { bent } else { normal };
+        Vec3::new(choose(bent.x, normal.x), choose(bent.y, normal.y), choose(bent.z, normal.z))
+    }
+
+    /// Shadow-ray origin of a smooth mesh: the point, lifted toward the viewer to those vertices' tangent planes that are above
+    /// it. This keeps facets from shadowing points that their shading normals say are lit (Hanika, *Hacking the Shadow
+    /// Terminator*, Ray Tracing Gems II, chapter 4).
+    #[inline(always)]
+    pub(super) fn shadow_point(&self, facet: &TrianglePoint, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
+        let point = self.placement.point(facet.local);
+        let normal = facet.normal.as_dvec3();
+        let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        let weights = facet.barycentric.to_array();
+        let mut lifted = DVec3::ZERO;
+        for i in 0..3 {
+            let own = self.placement.normal(normals[i].as_dvec3());
+            let reciprocal = own.length_recip();
+            let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
+            let own = own * if is_told { reciprocal } else { 0.0 };
+            let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
+            let height = (self.placement.point(facet.corners[i]) - point).dot(own);
+            lifted += own * (f64::from(weights[i]) * if height > 0.0 { height } else { 0.0 });
+        }
+        (point + lifted).as_vec3()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::signed as random;
+    use crate::math::transform::Transform;
+    use crate::world::placement::IdentityPlacement;
+
+    #[test]
+    fn unmoved_placement_equals_identity_transform() {
+        let mut next = random(17);
+        for _ in 0..10_000 {
+            // Zeros of both signs are common in architectural models.
+            let mut number = || {
+                let number = f64::from(next());
+                if number.abs() < 0.2 { 0.0 * number } else { number }
+            };
+            let at = DVec3::new(number(), number(), number());
+            let (map, here) = (&Transform::IDENTITY, IdentityPlacement);
+            let bits = |numbers: DVec3| numbers.to_array().map(f64::to_bits);
+            assert_eq!(bits(MeshPlacement::point(map, at)), bits(here.point(at)));
+            assert_eq!(MeshPlacement::reach(map, at.abs()), here.reach(at.abs()));
+            assert_eq!(bits(MeshPlacement::normal(map, at)), bits(here.normal(at)));
+            assert_eq!(map.shift(), here.shift());
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Rough glass solids without a light inside: sampling lights from their interior is pointless, as shadow rays never leave glass.
+
+use super::World;
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+
+/// Margin for rounding around lights, relative to their distance from the origin.
+const ROUNDING: f32 = 1e-5;
+
+/// Two bounding boxes of a light; the light is inside their intersection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightBox {
+    /// Box around the light's bounding sphere.
+    of_ball: Aabb,
+    /// Box of the emitting object.
+    of_object: Option<Aabb>,
+    /// The emitting object.
+    pub object: Option<u32>,
+}
+
+impl LightBox {
+    /// Whether the light may intersect a box.
+    pub fn meets(&self, bounds: &Aabb) -> bool {
+        self.of_ball.meets(bounds) && self.of_object.is_none_or(|own| own.meets(bounds))
+    }
+
+    /// Center and corners of the smaller box.
+    pub fn points(&self) -> impl Iterator<Item = Vec3> {
+        let own = self.of_object.unwrap_or(self.of_ball);
+        let corner = move |i: usize| {
+            let pick = |axis: usize| if i & (1 << axis) == 0 { own.min[axis] } else { own.max[axis] };
+            Vec3::new(pick(0), pick(1), pick(2))
+        };
+        std::iter::once(own.center()).chain((0..8).map(corner))
+    }
+}
+
+impl World {
+    /// Finds the closed glass solids that no light touches. The result is empty if no glass is rough.
+    pub(super) fn find_unlit_glass(&self) -> Box<[bool]> {
+        if !self.has_rough_glass() {
+            return Box::default();
+        }
+        let (objects, lamps) = (self.geometry.objects(), self.light_boxes());
+        let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
+        // Unite the bounding boxes of each solid's objects.
+        let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
+        for (id, object) in (0_u32..).zip(objects) {
+            if self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
+                let (own, joined) =
+                    (object.bounds().unwrap_or(everywhere), &mut boxes[self.body(id) as usize]);
+                *joined = Some(joined.map_or(own, |others| others.union(own)));
+            }
+        }
+        // Keep those that are closed and that no light may touch.
+        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
+        let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
+            let closed = bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open(body));
+            closed.is_some_and(|bounds| !holds_lamp(bounds))
+        };
+        (0..).zip(&boxes).map(is_dark).collect()
+    }
+
+    /// Boxes of all lights of finite extent, with a margin for rounding.
+    pub fn light_boxes(&self) -> Vec<LightBox> {
+        let boxes = self.lights.iter().filter_map(|(_, light)| {
+            let bounds = light.bounds().filter(|_| !light.is_beyond())?;
+            let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
+            let room = ROUNDING * (radius + center.abs().max_element());
+            let around = Vec3::splat(radius + room);
+            let of_ball = Aabb::around([center - around, center + around]);
+            let object = light.as_area().map(|area| area.object);
+            let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
+            Some(LightBox { of_ball, of_object: bounds.map(|own| own.grown(Vec3::splat(room))), object })
+        });
+        boxes.collect()
+    }
+
+    /// Whether sampling lights from inside a glass solid never finds one.
+    #[inline]
+    pub fn is_unlit_glass(&self, body: u32) -> bool {
+        self.unlit_glass.get(body as usize).copied().unwrap_or(false)
+    }
+}
