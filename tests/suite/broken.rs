@@ -535,7 +535,7 @@ fn what_is_no_text_is_refused_with_its_place() {
     assert_eq!((latin.0, latin.1), (2, 6));
     assert!(latin.2.starts_with("line 2 is not UTF-8 text: byte 0xe9 at offset 14"), "{}", latin.2);
     assert!(of_bytes(b"\x7fELF\x02\x01\0\0").message.contains("binary"));
-    assert!(of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message.contains("a picture, not"));
+    assert!(of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message.contains("an image (PNG), not"));
     let model = of_bytes(b"# by hand\nv 0 0 0\n");
     assert!(model.message.contains("a model (OBJ)"), "{}", model.message);
     assert!(model.help.expect("a way out").contains("rename it to scene.obj"));

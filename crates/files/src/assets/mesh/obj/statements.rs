@@ -66,6 +66,7 @@ impl Statements {
             found.statement(source, &mut words).map_err(|reason| source.wrong_at(start, reason))?;
             words.line();
         }
+        found.drop_absent_parts(source);
         found.check_ranges(source)?;
         found.warn(source);
         Ok(found)
@@ -138,6 +139,30 @@ impl Statements {
         Ok(())
     }
 
+    /// Drops the texture coordinates or normals of corners where the file has none at all, and warns of it.
+    fn drop_absent_parts(&mut self, source: &Source<'_>) {
+        for (part, count, what) in
+            [(1, self.uvs.len(), "texture coordinates"), (2, self.normals.len(), "normals")]
+        {
+            let Some(first) = self.corners.iter().position(|corner| corner[part] != NONE) else { continue };
+            if count == 0 {
+                let line = source.line(face_start(source, self.face_of(first)));
+                self.warnings.push(format!("line {line}: faces name {what}, but the file has none: ignored"));
+                self.corners.iter_mut().for_each(|corner| corner[part] = NONE);
+            }
+        }
+    }
+
+    /// The face of a corner, both counted from 0.
+    fn face_of(&self, corner: usize) -> usize {
+        let mut end = 0;
+        let is_before = |arity: &&u32| {
+            end += **arity as usize;
+            end <= corner
+        };
+        self.arities.iter().take_while(is_before).count()
+    }
+
     /// Checks the corners' indices. A face may precede the vertices that it names, so this happens at the end.
     fn check_ranges(&self, source: &Source<'_>) -> Result<(), AssetError> {
         let counts = [self.vertices.positions.len(), self.uvs.len(), self.normals.len()];
@@ -150,13 +175,9 @@ impl Statements {
             return Ok(());
         };
         let index = i64::from(self.corners[place][part]) + 1;
-        let mut end = 0;
-        let face = self.arities.iter().take_while(|arity| {
-            end += **arity as usize;
-            end <= place
-        });
-        Err(source.wrong_at(face_start(source, face.count()), out_of_range(part, index, counts[part])))
+        Err(source.wrong_at(face_start(source, self.face_of(place)), out_of_range(part, index, counts[part])))
     }
+
     fn warn(&mut self, source: &Source<'_>) {
         if let Some(start) = self.vertices.first_excess {
             let line = source.line(start);

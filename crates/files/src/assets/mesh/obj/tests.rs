@@ -451,6 +451,16 @@ fn names_of_materials_may_be_latin_1() {
     }
 }
 
+#[test]
+fn parts_that_the_file_has_none_of_are_dropped_with_a_warning() {
+    let loaded = read(&format!("{SQUARE}f 1 2 3\nf 1/1/4 3/2/4 4/3/4\n")).expect("whole");
+    assert!(loaded.mesh.uvs.is_empty());
+    for what in ["texture coordinates", "normals"] {
+        let warning = format!("line 6: faces name {what}, but the file has none: ignored");
+        assert!(loaded.warnings.iter().any(|said| said.contains(&warning)), "{:?}", loaded.warnings);
+    }
+}
+
 /// A corner as bits of its position and texture coordinates, with its normal.
 type CornerOf = (([u32; 3], [u32; 2]), Vec3);
 
