@@ -22,9 +22,18 @@ pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
-/// Key of all geometry in trees.
-pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
-    in_trees(&from(&coplanar(scene, of), origin), scene.render.accel)
+/// Key of all geometry in trees, with each object moved by its lift; `lifts` is empty if no object is moved.
+pub(in crate::pipeline) fn geometry(
+    scene: &Scene,
+    of: &Referents<'_>,
+    (origin, lifts): (DVec3, &[DVec3]),
+) -> Key {
+    let mut key = Fingerprint::new("lifted");
+    key.key(&from(&shapes(scene, of), origin));
+    for lift in lifts {
+        key.dvec3(*lift);
+    }
+    in_trees(&key.finish(), scene.render.accel)
 }
 
 /// Key of shapes and of which of them emit: lights in the plane of other shapes are moved.
@@ -44,7 +53,7 @@ pub(in crate::pipeline) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
 }
 
 /// These things in coordinates that start somewhere.
-fn from(of: &Key, origin: DVec3) -> Key {
+pub(in crate::pipeline) fn from(of: &Key, origin: DVec3) -> Key {
     Fingerprint::new("from").key(of).dvec3(origin).finish()
 }
 
@@ -196,7 +205,7 @@ mod tests {
         let scene = loaded_of(text).scene;
         let of = referents(&scene, &[], None);
         (
-            geometry(&scene, &of, DVec3::ZERO),
+            geometry(&scene, &of, (DVec3::ZERO, &[])),
             lights(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
             world(&surfaces(&scene, &of, &[]), &scene.camera, &of),
         )
@@ -227,9 +236,11 @@ mod tests {
         assert_eq!(lit.0, keys(BALL).0);
         assert_ne!(lit.1, keys(BALL).1);
         assert_ne!(keys(&BALL.replace("center = [0", "center = [1")).0, keys(BALL).0);
-        // A flat light may be in the plane of another surface.
-        let disk = BALL.replace("sphere", "disk").replace("radius", "normal = [0, 1, 0]\nradius");
-        assert_ne!(keys(&disk.replace("diffuse", "emission")).0, keys(&disk).0);
+        let lifted = |lift: DVec3| {
+            let scene = loaded_of(BALL).scene;
+            geometry(&scene, &referents(&scene, &[], None), (DVec3::ZERO, &[lift]))
+        };
+        assert_ne!(lifted(DVec3::X), lifted(DVec3::Y));
     }
 
     #[test]

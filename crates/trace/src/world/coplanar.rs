@@ -5,7 +5,9 @@
 //! off the plane by a tiny distance, toward the side to which it emits.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
+use super::MeshTree;
 use super::lower::file_emits;
 use crate::assets::LoadedMesh;
 use crate::geometry::cuboid::Cuboid;
@@ -131,7 +133,11 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     let Some(lights) = Lights::new(faces) else { return Vec::new() };
     let mut found = BTreeMap::new();
     let mut pairs = 0;
-    for object in 0..scene.objects.len() {
+    // Where glass touches a light, the interface is the light's: rays do not have to tell them apart.
+    let is_glass = |object: &usize| {
+        scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_glass())
+    };
+    for object in (0..scene.objects.len()).filter(|object| !is_glass(object)) {
         each_face(scene, meshes, (object, origin), Some(&lights), |face| {
             if pairs > MAX_PAIRS {
                 return;
@@ -152,8 +158,9 @@ fn are_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
 }
 
 /// Translation of each object that moves lights off coplanar surfaces; empty if no light needs it.
-pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<DVec3> {
-    let found = coplanar_lights(scene, meshes, origin);
+pub fn light_lifts(scene: &Scene, meshes: &[Arc<MeshTree>], origin: DVec3) -> Vec<DVec3> {
+    let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
+    let found = coplanar_lights(scene, &loaded, origin);
     if found.is_empty() {
         return Vec::new();
     }
@@ -252,7 +259,7 @@ fn is_lifted(light: &Face, face: &Face) -> bool {
 
 /// Whether two faces are coplanar and overlap.
 fn coincide(light: &Face, face: &Face) -> bool {
-    let apart = light.size() * COINCIDENT;
+    let apart = light.size().min(face.size()) * COINCIDENT;
     let is_on_plane = |corner: &DVec3| (*corner - face.point).dot(face.normal).abs() <= apart;
     let sine = light.normal.cross(face.normal).length_squared();
     if sine > PARALLEL * PARALLEL || !light.corners.iter().all(is_on_plane) {

@@ -10,7 +10,7 @@ use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, Lowered, Scene};
 
-use super::coplanar::lifts;
+use super::coplanar::light_lifts;
 use super::isolated::IsolationCache;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
@@ -64,8 +64,19 @@ impl Geometry {
         origin: DVec3,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
-        let lifts = lifts(scene, &loaded, origin);
+        Self::lifted(scene, meshes, (origin, light_lifts(scene, meshes, origin)), token)
+    }
+
+    /// Like [`Self::of_scene`], with the translations that [`light_lifts`] returned.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub fn lifted(
+        scene: &Scene,
+        meshes: &[Arc<MeshTree>],
+        (origin, lifts): (DVec3, Vec<DVec3>),
+        token: &CancelToken,
+    ) -> Result<Self, Cancelled> {
         let lift = |object: usize| lifts.get(object).copied().unwrap_or(DVec3::ZERO);
         let objects = scene.objects.iter().enumerate();
         let built = objects.map(|(id, object)| lowered(&object.shape, meshes, origin - lift(id), token));

@@ -35,7 +35,7 @@ pub use crate::accel::{PACKET_SIZE, RayInterval, SimdKernel, TreeNode};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
 pub use contact::{CoincidentSurface, ContactQuery, ContactScratch, OffsetPoints};
-pub use coplanar::{Coplanar, coplanar_lights, with_lifted_lights};
+pub use coplanar::{Coplanar, coplanar_lights, light_lifts, with_lifted_lights};
 pub use emitters::{lights, photon_source, sky};
 pub use geometry::{Geometry, Hit};
 pub use glass_solids::{GlassSolids, OpenGlass};

@@ -3,20 +3,22 @@
 
 use std::sync::Arc;
 
-use super::super::cache::{Pool, Spare};
+use super::super::cache::{Memo, Pool, Spare};
 use super::super::keys;
 use super::meshes::Meshes;
 use super::{Reading, Staged, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
-use crate::world::{Geometry, MeshTree, with_lifted_lights};
+use crate::world::{Geometry, MeshTree, light_lifts, with_lifted_lights};
 
 /// Cache of the stage.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct AccelCache {
     trees: Pool<Key, MeshTree>,
     geometry: Pool<Key, Geometry>,
+    /// Translations of lights in the plane of other surfaces.
+    lifts: Memo<Vec<DVec3>>,
     /// Key of the last tree over all objects.
     last: Option<Key>,
 }
@@ -63,15 +65,18 @@ pub(in crate::pipeline) fn accel(
     cache: &mut AccelCache,
     reading: &Reading<'_>,
 ) -> Result<Staged<Built>, Stop> {
-    let key = keys::geometry(scene, of, origin);
     let (meshes, kept) = trees(scene, meshes, cache, reading)?;
+    let lights_key = keys::from(&keys::coplanar(scene, of), origin);
+    let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
+    cache.lifts.set(lights_key, lifts.clone());
+    let key = keys::geometry(scene, of, (origin, &lifts));
     let is_last = cache.last == Some(key);
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
         let why = if is_last { "no shape changed" } else { "its trees were kept" };
         return Ok(Staged::reused(Built { meshes, geometry }, why));
     }
-    let build = || Geometry::of_scene(scene, &meshes, origin, reading.token);
+    let build = || Geometry::lifted(scene, &meshes, (origin, lifts), reading.token);
     let geometry = Arc::new(reading.pool.install(build)?);
     cache.geometry.insert(key, key, (geometry.clone(), geometry.own_memory_bytes()));
     cache.last = Some(key);
