@@ -344,9 +344,22 @@ impl Source {
             // Do not fill the memory with a file that is not going to be decoded.
             size(path, encoding, limits, token)?;
         }
-        let bytes =
-            read::rest(path, file, (length, FILE_LIMIT), Watch { progress: &ignore_progress, token })?;
-        let (hash, length) = (read::hash(&bytes), bytes.len() as u64);
+        let unreadable = |error: io::Error| AssetError::unreadable(path, describe_error(&error));
+        let without_text = match length > CHECKED_FIRST {
+            true => png::without_text(&file, token),
+            false => Ok(None),
+        };
+        token.check()?;
+        let (bytes, hash) = match without_text.map_err(unreadable)? {
+            Some(found) => found,
+            None => {
+                let watch = Watch { progress: &ignore_progress, token };
+                let bytes = read::rest(path, file, (length, FILE_LIMIT), watch)?;
+                let hash = read::hash(&bytes);
+                (bytes, hash)
+            }
+        };
+        let length = bytes.len() as u64;
         if length == 0 {
             return Err(AssetError::malformed(path, None, "the file is empty"));
         }

@@ -8,10 +8,62 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 use super::facts::Facts;
 use super::primaries::Primaries;
 use super::space::{ColorSpace, Curve};
+use crate::assets::FileHash;
+use crate::control::CancelToken;
 use crate::math::DMat3;
+
+const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
 /// Most bytes of a color profile, packed and unpacked.
 const PROFILE_BYTES: u32 = 16 << 20;
+
+/// Bytes of a chunk that is skipped between two polls of the token.
+const SKIPPED_BYTES: usize = 1 << 16;
+
+/// Reads a PNG without its text chunks, and hashes all of it: text of any length takes no memory. `None` if the file is not a PNG; it
+/// is then at its start again.
+pub(super) fn without_text(
+    mut file: impl Read + Seek,
+    token: &CancelToken,
+) -> io::Result<Option<(Vec<u8>, FileHash)>> {
+    let mut kept = Vec::new();
+    (&mut file).take(SIGNATURE.len() as u64).read_to_end(&mut kept)?;
+    if kept != SIGNATURE {
+        file.rewind()?;
+        return Ok(None);
+    }
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&kept);
+    loop {
+        // Read the length and the type of the next chunk.
+        let start = kept.len();
+        (&mut file).take(8).read_to_end(&mut kept)?;
+        hasher.update(&kept[start..]);
+        let Some([a, b, c, d, kind @ ..]) = kept[start..].first_chunk::<8>() else {
+            return Ok(Some((kept, *hasher.finalize().as_bytes())));
+        };
+        // The checksum follows the data.
+        let length = u64::from(u32::from_be_bytes([*a, *b, *c, *d])) + 4;
+        if !matches!(kind, b"tEXt" | b"zTXt" | b"iTXt") {
+            let start = kept.len();
+            (&mut file).take(length).read_to_end(&mut kept)?;
+            hasher.update(&kept[start..]);
+            continue;
+        }
+        kept.truncate(start);
+        let (mut skipped, mut left) = (vec![0; SKIPPED_BYTES], length);
+        while left > 0 {
+            token.check().map_err(|cancelled| io::Error::other(cancelled.to_string()))?;
+            let most = skipped.len().min(left as usize);
+            let got = file.read(&mut skipped[..most])?;
+            if got == 0 {
+                break;
+            }
+            hasher.update(&skipped[..got]);
+            left -= got as u64;
+        }
+    }
+}
 
 /// Decoder of the first frame, without texts.
 pub(super) struct PngDecoder<R: BufRead + Seek> {
