@@ -42,7 +42,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
             Number(Between(0.0, 1.0)),
             "",
             Is("0.0"),
-            "Above 0: the surface is there from this opacity on, and not below",
+            "Above 0: the surface exists where its opacity is at least this, and nowhere else. With `filter = \"mipmap\"`, distant surfaces keep their coverage",
         ),
     ],
     types: &[

@@ -74,7 +74,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Words(words::<Encoding>),
             "",
             Is("\"auto\""),
-            "`\"auto\"`: sRGB for colours in 8 and 16 bits, linear for numbers, normal maps and float files",
+            "`\"auto\"`: the color space that the file states, else sRGB for colors in 8 and 16 bits, linear for numbers, normal maps and float files",
         ),
     ],
     types: &[],
