@@ -362,7 +362,8 @@ fn a_line_end_in_a_name_ends_no_line() {
         (vec!["check", "no_materials.toml"], 2),
         (vec!["new", &forged(".new")], 0),
         (vec!["new", &toml], 2),
-        (vec![&toml, "--once", "--progress", "json"], 0),
+        (vec![&toml, "--once", "--progress", "json"], 2),
+        (vec![&toml, "--once", "--progress", "json", "--force"], 0),
     ] {
         let output = run(&arguments);
         let said = String::from_utf8([output.stdout, output.stderr].concat()).expect("UTF-8");

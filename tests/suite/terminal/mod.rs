@@ -127,7 +127,7 @@ fn a_scene_that_goes_and_comes_back_is_shown_again() {
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     fs::remove_file(folder.path("scene.toml")).expect("removed");
-    terminal.wait_for("broken");
+    terminal.wait_for("missing");
     folder.write("scene.toml", &SCENE.replace(RED, BLUE));
     terminal.wait_for_color("blue");
     terminal.wait_for_render(2);

@@ -202,7 +202,7 @@ fn a_folder_that_goes_and_comes_back_is_found_again() {
         let terminal = folder.terminal_with(&["/bin/sh", "-c", line, folder.program()], &[]);
         terminal.wait_for_render(1);
         fs::remove_dir_all(folder.path("work")).expect("removed");
-        terminal.wait_for("broken");
+        terminal.wait_for("missing");
         terminal.wait("which folder", |screen| {
             let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
             text.contains("work is not")
