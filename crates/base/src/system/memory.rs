@@ -40,7 +40,8 @@ fn of_groups(root: &Path, groups: &str) -> Option<Limit> {
     groups.lines().filter_map(of_line).min_by_key(|limit| limit.bytes)
 }
 
-/// The lowest limit from a group up to the root. In a container the path may be that of the host, and the root its own group.
+/// Returns the lowest limit from a group up to the root. In a container the path may be the host's, with the container's own group as
+/// the root.
 fn lowest(root: &Path, path: &str, file: &str) -> Option<Limit> {
     /// Version 1 says "none" with the largest number of pages.
     const NONE: u64 = 1 << 60;

@@ -29,7 +29,7 @@ pub fn folder() -> Option<PathBuf> {
 /// The folder cannot be made, the file cannot be written, or another one has its name.
 pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter().as_bytes();
-    // Each version of the scene has a folder of its own: one beside the references may be the user's.
+    // Each version of the scene has its own folder: a scene file next to the references may be the user's.
     let folder = folder
         .join(format!("starter-{}", &Fingerprint::new("starter").bytes(text).finish().to_string()[..16]));
     make(&folder)?;

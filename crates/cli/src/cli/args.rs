@@ -26,7 +26,7 @@ use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
-/// Calls, with what they do. No line is wider than a narrow terminal.
+/// Example calls and their effects. No line is wider than a narrow terminal.
 pub(super) const EXAMPLES: &str = "  \
   glimt new ball.toml                     write a scene to start from
   glimt ball.toml                         edit it in an editor and see it here
@@ -50,7 +50,7 @@ pub(super) const EXIT_CODES: &str = "\
 0 done; 1 the work failed; 2 the call or the scene is wrong; \
 130, 143, 129 ended by SIGINT, SIGTERM, SIGHUP.";
 
-/// Columns of help: those of the terminal, or 80. `COLUMNS` overrides them.
+/// Width of the help in columns: the terminal's, or 80. `COLUMNS` overrides them.
 fn help_columns() -> usize {
     let asked = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     asked.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)

@@ -112,7 +112,7 @@ fn columns() -> usize {
     terminal_columns(io::stderr().is_terminal()).unwrap_or(PLAIN_COLUMNS)
 }
 
-/// Columns of running text on stdout: those of the terminal, or 80 where there is none.
+/// Width of running text on stdout in columns: the terminal's, or 80 without a terminal.
 pub(super) fn answer_columns() -> usize {
     terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
 }

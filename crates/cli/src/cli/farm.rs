@@ -76,7 +76,7 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     }
 }
 
-/// Mebibytes that a container needs: those of a part, with a quarter to spare. `None`, with a warning, if the scene cannot be read.
+/// Returns the mebibytes that a container needs: the memory of a part plus a quarter. `None`, with a warning, if the scene cannot be read.
 fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);

@@ -121,7 +121,7 @@ fn last_words(
         let lost = lost.iter().map(|(path, lost)| format!("; {} {} since", path.display(), lost.words()));
         lines.push(ended.summary.clone() + &lost.collect::<String>());
     }
-    // After SIGHUP nobody reads it.
+    // After SIGHUP the terminal is gone.
     match writes.checkpoint().filter(|_| ended.status != ExitStatus::HANGUP) {
         Some(Ok(_)) if has_summary => {
             lines.iter_mut().rev().take(1).for_each(|line| *line = format!("{line}; {call} continues"));

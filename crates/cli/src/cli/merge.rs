@@ -176,7 +176,7 @@ impl Merge<'_> {
                 if self.has_block() {
                     self.redraw(&parts, &words, &mut block)?;
                 } else if is_new {
-                    // Parts that do not fit are named as soon as they are there.
+                    // Name parts that do not fit as soon as they appear.
                     part::check(&parts).map_err(|error| self.refuse(&error))?;
                 }
                 self.say_parts(parts.len(), &unfinished, &words);
@@ -324,7 +324,7 @@ impl Merge<'_> {
     }
 }
 
-/// Names the scene as a render beside it does: parts have only its file name, as they come from many folders.
+/// Records the scene's path as a render in that folder does. Parts hold only its file name, because they come from many folders.
 fn name_scene(finish: &mut Finish, out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     let beside = out.with_file_name(scene.as_str());

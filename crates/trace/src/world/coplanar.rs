@@ -133,7 +133,7 @@ pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> 
     let Some(lights) = Lights::new(faces) else { return Vec::new() };
     let mut found = BTreeMap::new();
     let mut pairs = 0;
-    // Where glass touches a light, the interface is the light's: rays do not have to tell them apart.
+    // Lights that touch glass stay in place: the glass solids already resolve that interface.
     let is_glass = |object: &usize| {
         scene.objects[*object].material.is_some_and(|own| scene.materials[own].kind.is_glass())
     };

@@ -1,4 +1,4 @@
-//! What a file says about its pixels and its decoder does not apply.
+//! Properties that a file states about its pixels and that its decoder does not apply.
 
 use super::icc;
 use super::space::ColorSpace;

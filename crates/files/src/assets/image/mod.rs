@@ -449,7 +449,7 @@ impl Source {
     }
 }
 
-/// A decoder of an image, with what it does not apply.
+/// A decoder of an image, with the properties that it does not apply.
 struct Opened {
     decoder: Box<dyn ImageDecoder>,
     facts: Facts,

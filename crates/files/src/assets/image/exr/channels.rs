@@ -97,8 +97,8 @@ impl Layer {
 
 type Layers = BTreeMap<String, Layer>;
 
-/// The channels to read. Colors come before gray, channels without a layer's name before those with one, those of one part before
-/// those of several, then the first; otherwise the only channel of a part, whatever its name.
+/// The channels to read. Colors come before gray, channels without a layer's name before those with one, channels of one part before
+/// channels of several, then the first; otherwise the only channel of a part, whatever its name.
 pub(super) fn choose(headers: &[Header]) -> Option<Chosen> {
     let mut parts: Vec<Layers> =
         headers.iter().enumerate().map(|(part, header)| layers(part, header)).collect();

@@ -34,7 +34,7 @@ pub(super) struct ExrDecoder<R> {
 }
 
 impl<R: BufRead + Seek> ExrDecoder<R> {
-    /// A decoder that takes at most so many bytes of memory besides the pixels.
+    /// Creates a decoder that allocates at most `memory_bytes` besides the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
         let samplings = sampling::find(&mut file).map_err(ImageError::IoError)?;
         let file = Unsampled::new(file, &samplings);
