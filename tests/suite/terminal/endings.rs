@@ -67,7 +67,7 @@ fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
     let slow = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &slow);
     let mut terminal = folder.terminal();
-    terminal.wait_for("ETA");
+    terminal.wait_for_coverage();
     terminal.press("wq");
     assert_eq!(terminal.end_saying("wrote scene.png"), 0);
     assert!(folder.path("scene.png").is_file());

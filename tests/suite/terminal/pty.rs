@@ -319,6 +319,18 @@ impl Terminal {
         self.wait(text, |screen| screen.contents().contains(text));
     }
 
+    /// Waits until a render has a sample of every pixel.
+    #[track_caller]
+    pub fn wait_for_coverage(&self) {
+        self.wait("a sample of every pixel", |screen| {
+            let text = screen.contents();
+            let counts =
+                text.lines().filter_map(|line| line.split_once(" samples · ")?.0.split_whitespace().last());
+            let of_total = |count: &str| count.split('/').next().and_then(|done| done.parse::<f64>().ok());
+            counts.filter_map(of_total).any(|done| done >= 2.0)
+        });
+    }
+
     /// Waits until this many renders are finished and no other is under way.
     #[track_caller]
     pub fn wait_for_render(&self, number: usize) {

@@ -233,7 +233,7 @@ fn an_interrupted_image_continues_in_the_next_call() {
         folder.once(&[])
     };
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml", "--checkpoint", "0.01"]);
-    terminal.wait_for("ETA");
+    terminal.wait_for_coverage();
     terminal.press("s");
     terminal.wait_for("w saves it");
     assert!(!folder.path("scene.png").exists());

@@ -58,10 +58,12 @@ fn since(state: &State) -> String {
     }
     let written = &state.saving.written;
     let is_older = written.iter().all(|written| written.generation < state.saving.saved_at);
+    if state.saving.own.state == OwnState::Written {
+        return String::new();
+    }
     if !state.request.is_own() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            OwnImage { state: OwnState::Written, .. } => String::new(),
             OwnImage { .. } if is_older => " (older than your last edit)".to_owned(),
             OwnImage { .. } if is_by_hand => String::new(),
             OwnImage { fraction, .. } => {
@@ -166,6 +168,7 @@ mod tests {
         desk.press('r');
         let begun = desk.state.request.generation;
         desk.worker(Event::Started { generation: begun });
+        desk.worker(Event::Progress { generation: begun, progress: progress(0.5, None) });
         desk.press('l');
         desk.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
         assert!(
@@ -176,7 +179,7 @@ mod tests {
         desk.worker(done(begun, Vec::new(), false));
         desk.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), format!("{made}; the render after it is not finished (0 %)"));
+        assert_eq!(words(&desk.state), format!("{made}; the render after it is not finished (50 %)"));
         assert!(desk.text().contains("not saved · w saves it"), "of the one at hand: {}", desk.text());
     }
 
@@ -354,6 +357,31 @@ mod tests {
         assert!(words.contains("--set 'camera.position=["), "{words}");
         desk.press('0');
         assert_eq!(not_kept(&desk.state), None);
+    }
+
+    #[test]
+    fn passing_by_the_own_image_leaves_its_file_finished() {
+        let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
+        let mut desk = Desk::new();
+        desk.worker(Event::Started { generation: 1 });
+        desk.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        desk.finish([200, 30, 30]);
+        desk.press('s');
+        desk.finish([30, 200, 30]);
+        // The next key comes before the request of the own image ends.
+        desk.press('0');
+        desk.worker(Event::Started { generation: desk.state.request.generation });
+        assert_eq!(words(&desk.state), made);
+        desk.press(']');
+        assert_eq!(words(&desk.state), made);
+        // Samples of another own image.
+        desk.press('0');
+        let generation = desk.state.request.generation;
+        desk.worker(Event::Started { generation });
+        desk.worker(Event::Progress { generation, progress: progress(0.2, None) });
+        assert_eq!(words(&desk.state), format!("{made}; the render after it was stopped at 20 %"));
+        desk.press(']');
+        assert_eq!(words(&desk.state), format!("{made}; the render after it is not finished (20 %)"));
     }
 
     #[test]

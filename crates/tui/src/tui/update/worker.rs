@@ -75,7 +75,11 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 state.work.curve.note(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
-            if state.request.is_own() || state.saving.own.state == (OwnState::Begun { is_rendering: true }) {
+            let is_rendering = OwnState::Begun { is_rendering: true };
+            if state.request.is_own() {
+                state.saving.own.state = is_rendering;
+            }
+            if state.saving.own.state == is_rendering {
                 state.saving.own.fraction = progress.fraction;
             }
         }
@@ -198,7 +202,8 @@ fn started(state: &mut State) {
     state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
-    if state.request.is_own() {
+    // An image in its file stays there until samples of another are traced.
+    if state.request.is_own() && state.saving.own.state != OwnState::Written {
         state.saving.own = OwnImage { state: OwnState::Begun { is_rendering: true }, fraction: 0.0 };
     }
     close_empty_pane(state);
