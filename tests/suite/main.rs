@@ -1,5 +1,6 @@
 //! The program as a whole: one crate, so that it links once.
 
+mod architecture;
 mod bench;
 mod bias;
 mod broken;
@@ -14,7 +15,6 @@ mod docs;
 mod extremes;
 mod gltf;
 mod hostile;
-mod house;
 mod info;
 mod inputs;
 mod json;

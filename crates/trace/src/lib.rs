@@ -17,4 +17,4 @@ pub mod world;
 use glimt_base::{choice, control, film, math, sampling};
 use glimt_files::assets;
 use glimt_kernel::{accel, geometry, lights, materials};
-use glimt_scene::scene;
+use glimt_scene as scene;

@@ -1,8 +1,63 @@
-//! glimt: the terminal front end. The map of the house is in the crate `glimt`.
+//! The terminal front end: messages and a picture in, requests and cells out.
+//!
+//! An event comes in, `update` turns state and event into effects, `view` draws the state; one loop in
+//! [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless something
+//! changed. The help and the bottom line are made from the one table in `keymap`.
 
-pub mod tui;
+mod action;
+mod camera;
+mod chrome;
+mod color;
+mod display;
+mod editor;
+mod environment;
+mod event;
+mod exit_summary;
+mod files;
+mod graphics;
+mod history;
+mod input;
+mod keymap;
+mod known;
+mod line;
+mod mosaic;
+mod noise_curve;
+mod options;
+pub mod paint;
+mod pixels;
+mod presenter;
+mod preview_kind;
+mod printed;
+mod probe;
+mod rescale;
+mod run;
+mod signals;
+mod state;
+mod terminal;
+mod terminals;
+mod update;
+mod view;
+mod writer;
 
-// The rooms below, under the names that they have in the whole house.
+#[cfg(test)]
+mod by_hand;
+#[cfg(test)]
+mod fixtures;
+#[cfg(test)]
+mod tests;
+
+// Modules of the crates below, under the names used throughout the workspace.
 use glimt_base::{choice, film, math, system};
-use glimt_pipeline::pipeline;
-use glimt_scene::scene;
+use glimt_pipeline as pipeline;
+use glimt_scene as scene;
+
+pub use color::{ColorChoice, ColorDepth, in_xterm};
+pub use editor::editor;
+pub use graphics::PixelScreen;
+pub use mosaic::filled;
+pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
+pub use printed::{Named, printed};
+pub use probe::{Answers, Probe, probe};
+pub use run::run;
+pub use view::preview::shown;
+pub use view::text::wrapped;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glimt::choice::Choice;
 use glimt::cli::args::Draft;
-use glimt::cli::schema::{FILE, LINE, schema, text};
+use glimt::cli::commands::schema::{FILE, LINE, schema, text};
 use glimt::scene::starter;
 use serde_json::Value;
 

@@ -194,7 +194,7 @@ pub(super) mod tests {
     use super::*;
 
     /// A step of made-up numbers: three pictures around an error.
-    pub(in crate::bench) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> Step {
+    pub(crate) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> Step {
         let of = |(number, factor): (u32, f64)| Picture {
             seed: number,
             samples,
@@ -220,14 +220,14 @@ pub(super) mod tests {
     }
 
     /// A method whose error halves with the time, on a bias.
-    pub(in crate::bench) fn method(name: &str, noise: f64, bias: f64) -> MethodResult {
+    pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodResult {
         let steps =
             [1.0, 4.0, 16.0, 64.0].map(|samples| step(samples, samples * 0.01, noise / samples + bias, bias));
         MethodResult::new(name.to_owned(), 0.003, steps.to_vec())
     }
 
     /// Two scenes with two methods each.
-    pub(in crate::bench) fn results() -> Results {
+    pub(crate) fn results() -> Results {
         let scene = |name: &str| SceneResult {
             scene: name.to_owned(),
             width: 128,

@@ -1,7 +1,7 @@
 //! Integrators: render the samples of a tile of a world. Rays travel in batches, as in a wavefront renderer: first a
 //! queue of camera rays, then the shadow rays of their hits, then the queue of the next bounce.
 //!
-//! Each module may use the modules above it and no others; `tests/suite/house` compares the sources with this table.
+//! Each module may use the modules above it and no others; `tests/suite/architecture` compares the sources with this table.
 //!
 //! ```text
 //! view, counters      AOVs; counters of rays

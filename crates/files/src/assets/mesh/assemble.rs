@@ -16,7 +16,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 const BATCH: usize = 1 << 14;
 
 /// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
-pub(in crate::assets) fn assemble(source: &Source<'_>, mut parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+pub(crate) fn assemble(source: &Source<'_>, mut parsed: Parsed) -> Result<LoadedMesh, AssetError> {
     corners::split(&mut parsed, source.watch.token)?;
     let Parsed {
         positions,

@@ -1,13 +1,13 @@
 //! Mesh files: OBJ with MTL, OFF, PLY, STL. Each parser gives the numbers as the file has them; `assemble` makes a mesh of
 //! them that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
-pub(in crate::assets) mod assemble;
+pub(crate) mod assemble;
 mod corners;
 mod mtl;
-pub(in crate::assets) mod normals;
+pub(crate) mod normals;
 mod obj;
 mod off;
-pub(in crate::assets) mod parsed;
+pub(crate) mod parsed;
 mod places;
 pub mod ply;
 mod polygon;
@@ -63,10 +63,10 @@ type Reader = fn(&Path, u64, Watch<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A file in memory, with the watch on its parsing.
 #[derive(Clone, Copy)]
-pub(in crate::assets) struct Source<'a> {
-    pub(in crate::assets) path: &'a Path,
-    pub(in crate::assets) bytes: &'a [u8],
-    pub(in crate::assets) watch: Watch<'a>,
+pub(crate) struct Source<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) bytes: &'a [u8],
+    pub(crate) watch: Watch<'a>,
 }
 
 impl Source<'_> {

@@ -78,7 +78,7 @@ fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
 }
 
 /// Whether a mesh without normals is of flat faces, as a box is: the normals of the faces around most vertices cancel in part.
-pub(in crate::assets) fn is_faceted(mesh: &TriangleMesh) -> bool {
+pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
     /// Least length of the mean of the unit normals around a vertex of a smooth surface: a cone of 32 degrees about them.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;

@@ -12,7 +12,7 @@ use crate::math::{DVec3, Vec2, Vec3};
 
 /// Polygons over vertices: corners of all, one after the other.
 #[derive(Debug, Default)]
-pub(in crate::assets) struct Faces {
+pub(crate) struct Faces {
     pub(super) corners: Vec<u32>,
     /// Corners of each face; empty as long as all are triangles.
     pub(super) arities: Vec<u32>,
@@ -20,12 +20,12 @@ pub(in crate::assets) struct Faces {
 
 impl Faces {
     /// Adds a corner to the face that [`Faces::close`] will end.
-    pub(in crate::assets) fn corner(&mut self, vertex: u32) {
+    pub(crate) fn corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
 
     /// Ends a face of this many corners.
-    pub(in crate::assets) fn close(&mut self, arity: usize) {
+    pub(crate) fn close(&mut self, arity: usize) {
         if self.arities.is_empty() && arity == 3 {
             return;
         }
@@ -36,7 +36,7 @@ impl Faces {
         self.arities.push(arity as u32);
     }
 
-    pub(in crate::assets) fn reserve(&mut self, triangles: usize) {
+    pub(crate) fn reserve(&mut self, triangles: usize) {
         self.corners.reserve(3 * triangles);
     }
 
@@ -51,10 +51,10 @@ impl Faces {
     }
 
     /// Most corners that vertices of 32 bits can number.
-    pub(in crate::assets) const MOST_CORNERS: usize = u32::MAX as usize;
+    pub(crate) const MOST_CORNERS: usize = u32::MAX as usize;
 
     /// Number of faces.
-    pub(in crate::assets) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
     }
 }
@@ -62,43 +62,43 @@ impl Faces {
 /// A mesh file's numbers. `normals`, `normal_groups`, `uvs`, `second_uvs` and `colors` are empty or one for each position; a normal of zero is missing.
 /// `face_materials` is empty or one for each face.
 #[derive(Debug, Default)]
-pub(in crate::assets) struct Parsed {
-    pub(in crate::assets) positions: Vec<DVec3>,
-    pub(in crate::assets) normals: Vec<Vec3>,
-    pub(in crate::assets) normal_groups: Vec<NormalGroup>,
-    pub(in crate::assets) uvs: Vec<Vec2>,
-    pub(in crate::assets) second_uvs: Vec<Vec2>,
+pub(crate) struct Parsed {
+    pub(crate) positions: Vec<DVec3>,
+    pub(crate) normals: Vec<Vec3>,
+    pub(crate) normal_groups: Vec<NormalGroup>,
+    pub(crate) uvs: Vec<Vec2>,
+    pub(crate) second_uvs: Vec<Vec2>,
     /// In sRGB.
-    pub(in crate::assets) colors: Vec<[u8; 3]>,
-    pub(in crate::assets) faces: Faces,
+    pub(crate) colors: Vec<[u8; 3]>,
+    pub(crate) faces: Faces,
     /// Texture coordinates of each corner of the faces, NaN where it takes those of its vertex; or empty.
-    pub(in crate::assets) corner_uvs: Vec<Vec2>,
+    pub(crate) corner_uvs: Vec<Vec2>,
     /// Color of each corner of the faces, or empty.
-    pub(in crate::assets) corner_colors: Vec<[u8; 3]>,
+    pub(crate) corner_colors: Vec<[u8; 3]>,
     /// Whether each face has vertices of its own, of which those at one place become one.
-    pub(in crate::assets) has_corners_apart: bool,
-    pub(in crate::assets) face_materials: Vec<u32>,
-    pub(in crate::assets) materials: Vec<FileMaterial>,
-    pub(in crate::assets) warnings: Vec<String>,
-    pub(in crate::assets) material_warnings: Vec<String>,
-    pub(in crate::assets) companions: Vec<Companion>,
-    pub(in crate::assets) pictures: Vec<PathBuf>,
+    pub(crate) has_corners_apart: bool,
+    pub(crate) face_materials: Vec<u32>,
+    pub(crate) materials: Vec<FileMaterial>,
+    pub(crate) warnings: Vec<String>,
+    pub(crate) material_warnings: Vec<String>,
+    pub(crate) companions: Vec<Companion>,
+    pub(crate) pictures: Vec<PathBuf>,
 }
 
 /// The range of the colors of a file whose format does not say it: 0 to 1, or 0 to 255.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::assets) struct ColorRange {
+pub(crate) struct ColorRange {
     greatest: f64,
     has_fractions: bool,
 }
 
 impl ColorRange {
     /// The greatest number.
-    pub(in crate::assets) fn greatest(&self) -> f64 {
+    pub(crate) fn greatest(&self) -> f64 {
         self.greatest
     }
 
-    pub(in crate::assets) fn add(&mut self, parts: [f64; 3]) {
+    pub(crate) fn add(&mut self, parts: [f64; 3]) {
         for part in parts.into_iter().filter(|part| part.is_finite()) {
             self.greatest = self.greatest.max(part);
             self.has_fractions |= part.fract() != 0.0;
@@ -106,18 +106,18 @@ impl ColorRange {
     }
 
     /// The number that stands for 1. Fractions up to 2 are colors brighter than 1.
-    pub(in crate::assets) fn one(&self) -> f64 {
+    pub(crate) fn one(&self) -> f64 {
         let are_bytes = self.greatest > 2.0 || (self.greatest > 1.0 && !self.has_fractions);
         if are_bytes { 255.0 } else { 1.0 }
     }
 
     /// A color of this range in bytes.
-    pub(in crate::assets) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
+    pub(crate) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
         color_bytes(parts.map(|part| part / self.one()))
     }
 }
 
 /// A vertex color with parts from 0 to 1 in sRGB, in bytes; NaN is 0.
-pub(in crate::assets) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
+pub(crate) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }

@@ -184,7 +184,7 @@ impl MeshEmitter {
     }
 
     #[cfg(test)]
-    pub(in crate::lights) fn normal_of(&self, primitive: u32) -> Option<DVec3> {
+    pub(crate) fn normal_of(&self, primitive: u32) -> Option<DVec3> {
         let ([a, b, c], _) = self.triangles.iter().find(|(_, other)| *other == primitive)?;
         Some((*b - *a).cross(*c - *a).normalize())
     }

@@ -21,7 +21,7 @@ macro_rules! triangle_packet_of {
     }};
 }
 
-pub(in crate::lights) use triangle_packet_of;
+pub(crate) use triangle_packet_of;
 
 impl AreaLight {
     /// [`AreaLight::sample_untextured`] for the points in mask `used`.

@@ -67,6 +67,6 @@ impl SphereEmitter {
 
 /// 1 − cos of an angle up to 90°, from its sin².
 #[inline(always)]
-pub(in crate::lights) fn one_minus_cos(sin2: f32) -> f32 {
+pub(crate) fn one_minus_cos(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).sqrt())
 }

@@ -1,0 +1,172 @@
+//! Values that shells offer for arguments: files by their endings, and the keys of `--set`.
+
+use std::ffi::{OsStr, OsString};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
+
+use crate::scene::keys::key::{Form, KeyInfo, Kind};
+use crate::scene::keys::{color_names, paths, tables};
+use crate::scene::outline::{OutlineTable, outline};
+use crate::scene::{is_mesh, text_now};
+
+/// Words of the line that a shell completes, if its script passes the line in another form.
+static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Keeps the words of the line for completers that look at other words than theirs.
+pub(crate) fn remember(words: &[OsString]) {
+    WORDS.get_or_init(|| words.to_vec());
+}
+
+/// Returns the words of the line that is completed.
+fn line() -> Vec<OsString> {
+    WORDS.get().cloned().unwrap_or_else(|| std::env::args_os().collect())
+}
+
+/// Completes scenes.
+pub(crate) fn scenes() -> ArgValueCompleter {
+    ArgValueCompleter::new(PathCompleter::file().filter(is_scene))
+}
+
+/// Completes scenes and models.
+pub(crate) fn scenes_and_models() -> ArgValueCompleter {
+    ArgValueCompleter::new(PathCompleter::file().filter(|path| is_scene(path) || is_mesh(path)))
+}
+
+/// Completes glTF files.
+pub(crate) fn importable() -> ArgValueCompleter {
+    let has = |path: &Path, ending: &str| path.extension().is_some_and(|is| is.eq_ignore_ascii_case(ending));
+    ArgValueCompleter::new(PathCompleter::file().filter(move |path| has(path, "glb") || has(path, "gltf")))
+}
+
+fn is_scene(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
+
+/// Completes `TABLE.KEY=VALUE`: the keys of the scene that is named before it, else of every table that each scene may have.
+pub(crate) fn sets() -> ArgValueCompleter {
+    ArgValueCompleter::new(|current: &OsStr| {
+        let Some(current) = current.to_str() else { return Vec::new() };
+        let scene = line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
+        let text = scene.and_then(|scene| text_now(&scene).ok());
+        candidates(text.as_deref().unwrap_or_default(), current)
+    })
+}
+
+/// Completes the paths of keys, as `glimt explain` takes them.
+pub(crate) fn keys() -> ArgValueCompleter {
+    ArgValueCompleter::new(|current: &OsStr| {
+        let Some(current) = current.to_str() else { return Vec::new() };
+        let all = paths().into_iter().filter(|(path, _)| path.starts_with(current));
+        all.map(|(path, doc)| CompletionCandidate::new(path).help(Some(doc.replace('`', "").into())))
+            .collect()
+    })
+}
+
+/// The candidates for what is typed so far, in a scene of this text.
+fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
+    /// Nobody reads on from here.
+    const MOST: usize = 2000;
+    let outline = outline(text);
+    let singles = tables().iter().filter(|table| table.form == Form::Single);
+    let absent = singles.filter(|info| !outline.iter().any(|table| table.info.name == info.name));
+    let of_absent = absent.flat_map(|info| info.keys.iter().map(|key| (info.name.to_owned(), key)));
+    let of = |table: &OutlineTable| {
+        let paths = table.paths();
+        let known = table.known();
+        paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
+    };
+    let keys = outline.iter().flat_map(of).chain(of_absent);
+    let of_key = |(path, key): (String, &'static KeyInfo)| {
+        of_path(&format!("{path}.{}=", key.name), key.doc, typed, || values(key.kind, &outline))
+    };
+    let of_type = |table: &OutlineTable| {
+        let types = table.info.types.iter().map(|kind| (kind.name.to_owned(), kind.doc));
+        let types: Vec<Value> = types.collect();
+        let paths = if types.is_empty() { Vec::new() } else { table.paths() };
+        let of_path = |path: String| of_path(&format!("{path}.type="), "The type", typed, || types.clone());
+        paths.into_iter().flat_map(of_path).collect::<Vec<_>>()
+    };
+    keys.flat_map(of_key).chain(outline.iter().flat_map(of_type)).take(MOST).collect()
+}
+
+/// A value and its description.
+type Value = (String, &'static str);
+
+/// The candidates for one path with its `=`: itself, or once it is typed, its values.
+fn of_path(
+    path: &str,
+    doc: &str,
+    typed: &str,
+    values: impl FnOnce() -> Vec<Value>,
+) -> Vec<CompletionCandidate> {
+    let help = |text: &str| Some(text.replace('`', "").into());
+    if path.starts_with(typed) && path != typed {
+        return vec![CompletionCandidate::new(path).help(help(doc))];
+    }
+    let Some(begun) = typed.strip_prefix(path) else { return Vec::new() };
+    let fitting = values().into_iter().filter(|(value, _)| value.starts_with(begun));
+    fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(doc))).collect()
+}
+
+/// The values of a kind that have names, in a scene of these tables.
+fn values(kind: Kind, outline: &[OutlineTable]) -> Vec<Value> {
+    let plain = |value: &str| (value.to_owned(), "");
+    match kind {
+        Kind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),
+        Kind::Flag => ["true", "false"].map(plain).to_vec(),
+        Kind::Color(_) | Kind::ColorOrTexture(_) | Kind::Emission(_) => color_names().map(plain).collect(),
+        Kind::Texture | Kind::Heights | Kind::Material => {
+            let named = outline.iter().filter(|table| Some(table.info.name) == kind.named_in());
+            named.filter_map(|table| table.name.as_ref()).map(|name| plain(&name.text)).collect()
+        }
+        Kind::Whole(..)
+        | Kind::Number(_)
+        | Kind::Text
+        | Kind::File(_)
+        | Kind::NumberOrTexture(_)
+        | Kind::Numbers(..)
+        | Kind::Scale(_) => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn offered(text: &str, typed: &str) -> Vec<String> {
+        let all = candidates(text, typed);
+        all.iter().map(|one| one.get_value().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn keys_are_those_of_the_scene() {
+        let text = "[materials.wall]\ntype = \"mirror\"\n[[sphere]]\nname = \"ball\"\n";
+        let mirror = offered(text, "materials.wall.ref");
+        assert_eq!(mirror, ["materials.wall.reflectance="]);
+        assert_eq!(offered(text, "materials.wall.diff"), [""; 0]);
+        assert_eq!(offered(text, "sphere.1.r"), ["sphere.1.radius="]);
+        assert_eq!(
+            offered(text, "sphere.b"),
+            ["center", "radius", "material", "name"].map(|key| format!("sphere.ball.{key}="))
+        );
+        assert_eq!(offered("", "render.sam"), ["render.samples="]);
+        assert_eq!(offered("", "sphere"), [""; 0]);
+    }
+
+    #[test]
+    fn values_are_offered_once_the_key_is_there() {
+        assert_eq!(
+            offered("", "render.integrator="),
+            ["render.integrator=whitted", "render.integrator=path"]
+        );
+        assert_eq!(offered("", "photons.enabled=t"), ["photons.enabled=true"]);
+        assert_eq!(offered("", "render.width="), [""; 0]);
+        let text = "[materials.wall]\n[materials.floor]\n[[sphere]]\n";
+        assert_eq!(offered(text, "sphere.1.material=w"), ["sphere.1.material=wall"]);
+        assert_eq!(offered(text, "materials.wall.diffuse=tom"), ["materials.wall.diffuse=tomato"]);
+        assert_eq!(offered(text, "materials.wall.t"), ["materials.wall.type="]);
+        assert_eq!(offered(text, "materials.wall.type=mi"), ["materials.wall.type=mirror"]);
+    }
+}

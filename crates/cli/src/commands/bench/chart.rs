@@ -1,0 +1,205 @@
+//! The plot in the terminal, in braille: after the work, and above the bar while it goes on.
+
+use std::io::IsTerminal;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::{Constraint, Rect};
+use ratatui::style::{Color, Style};
+use ratatui::symbols::Marker;
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
+
+use crate::bench::{Results, SceneResult};
+use crate::console::Console;
+use crate::progress::seconds;
+use crate::scene::sanitize::visible;
+use crate::tui::paint::in_lines;
+
+/// Colours of the methods, in their order, from the palette of the terminal.
+const COLORS: [Color; 6] =
+    [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
+/// Signs of the methods' points, in their order: no sign comes back with the same colour for thirty methods.
+const SIGNS: [char; 5] = ['o', 'x', '+', '*', '#'];
+/// Rows of a chart.
+const ROWS: u16 = 16;
+/// Columns at most.
+const COLUMNS: u16 = 100;
+/// Nothing can be read in less.
+const LEAST: (u16, u16) = (30, 8);
+/// Rows of a terminal that a chart leaves while the work goes on: what is done, the bar, and the prompt.
+const LEFT: u16 = 6;
+
+/// A scene with its methods, as far as they are measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Lines {
+    scene: String,
+    methods: Vec<Line>,
+}
+
+/// A method: seconds and relMSE of its steps.
+#[derive(Clone, Debug, PartialEq)]
+struct Line {
+    name: String,
+    points: Vec<(f64, f64)>,
+}
+
+impl Lines {
+    fn of(scene: &SceneResult) -> Self {
+        let methods = scene.methods.iter().map(|method| Line {
+            name: method.name.clone(),
+            points: method.steps.iter().map(|step| (step.seconds, step.relmse)).collect(),
+        });
+        Self { scene: scene.scene.clone(), methods: methods.collect() }
+    }
+
+    /// One more point; those of another scene are forgotten.
+    pub(super) fn add(&mut self, scene: &str, method: &str, point: (f64, f64)) {
+        if self.scene != scene {
+            *self = Self { scene: scene.to_owned(), methods: Vec::new() };
+        }
+        match self.methods.iter_mut().find(|line| line.name == method) {
+            Some(line) => line.points.push(point),
+            None => self.methods.push(Line { name: method.to_owned(), points: vec![point] }),
+        }
+    }
+
+    /// Text above the bar in a terminal of this size: nothing before there are points, or if there is no room.
+    pub(super) fn text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
+        // A line that is as wide as the terminal would be two in some.
+        let size = (columns.saturating_sub(1).min(COLUMNS), rows.saturating_sub(LEFT).min(ROWS));
+        if self.methods.is_empty() || size.0 < LEAST.0 || size.1 < LEAST.1 {
+            return String::new();
+        }
+        in_lines(&self.drawn(size), is_colored)
+    }
+
+    fn drawn(&self, (columns, rows): (u16, u16)) -> Buffer {
+        let points: Vec<Vec<(f64, f64)>> = self.methods.iter().map(Line::powers).collect();
+        let styles = SIGNS.iter().cycle().zip(COLORS.iter().cycle());
+        let lines = self.methods.iter().zip(&points).zip(styles);
+        let (trends, signs): (Vec<_>, Vec<_>) =
+            lines.map(|((line, points), style)| datasets(&line.name, points, style)).unzip();
+        let across = bounds(points.iter().flatten().map(|point| point.0));
+        let up = bounds(points.iter().flatten().map(|point| point.1));
+        // Signs lie over all trends.
+        let chart = Chart::new(trends.into_iter().chain(signs).collect())
+            .hidden_legend_constraints((Constraint::Percentage(70), Constraint::Percentage(70)))
+            .x_axis(Axis::default().bounds(across).labels(labels(across, seconds)))
+            .y_axis(Axis::default().bounds(up).labels(labels(up, |error| format!("{error:.0e}"))));
+        let area = Rect::new(0, 0, columns, rows);
+        let mut buffer = Buffer::empty(area);
+        chart.render(area, &mut buffer);
+        buffer
+    }
+}
+
+/// A line through the points, and their signs with the name.
+fn datasets<'a>(
+    name: &str,
+    points: &'a [(f64, f64)],
+    (sign, color): (&char, &Color),
+) -> (Dataset<'a>, Dataset<'a>) {
+    let shared = Dataset::default().data(points).style(Style::new().fg(*color));
+    let signs = shared.clone().marker(Marker::Custom(*sign)).graph_type(GraphType::Scatter);
+    let trend = shared.marker(Marker::Braille).graph_type(GraphType::Line);
+    (trend, signs.name(format!("{sign} {}", visible(name))))
+}
+
+impl Line {
+    /// Logarithms of what has one.
+    fn powers(&self) -> Vec<(f64, f64)> {
+        let seen = self.points.iter().filter(|point| point.0 > 0.0 && point.1 > 0.0);
+        seen.map(|point| (libm::log10(point.0), libm::log10(point.1))).collect()
+    }
+}
+
+/// Draws every scene where stdout is a terminal.
+pub(super) fn show(results: &Results, console: &Console) {
+    if !std::io::stdout().is_terminal() {
+        return;
+    }
+    let columns = crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(LEAST.0, COLUMNS));
+    for scene in &results.scenes {
+        console.answer(&format!("{}: relMSE against seconds, both logarithmic", scene.scene));
+        console.text(&in_lines(&Lines::of(scene).drawn((columns, ROWS)), console.is_colored()));
+    }
+}
+
+/// From the least to the greatest, with a little room.
+fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let (low, high) = values
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high { [-1.0, 1.0] } else { [low - 0.1, high + 0.1] }
+}
+
+/// At both ends and in the middle.
+fn labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<String> {
+    [low, (low + high) / 2.0, high].map(|power| word(libm::pow(10.0, power))).to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::{MethodResult, ReferenceResult, Step};
+
+    fn scene() -> SceneResult {
+        let step = |samples: f64| Step {
+            samples,
+            budget: None,
+            seconds: samples * 0.01,
+            relmse: 0.1 / samples,
+            spread: [0.0, 1.0],
+            uncertainty: 0.0,
+            bias: None,
+            brightness: None,
+            pictures: Vec::new(),
+        };
+        let method = MethodResult {
+            name: "path".to_owned(),
+            setup_seconds: 0.0,
+            steps: vec![step(1.0), step(16.0)],
+            slope: None,
+            last_slope: None,
+            time_to: [None; 3],
+            verdict: crate::bench::Verdict::Unknown,
+        };
+        let reference =
+            ReferenceResult { samples: None, noise: 0.0, seconds: None, is_cached: false, files: Vec::new() };
+        SceneResult { scene: "a.toml".to_owned(), width: 8, height: 8, reference, methods: vec![method] }
+    }
+
+    #[test]
+    fn the_chart_has_its_lines_names_and_ends() {
+        let buffer = Lines::of(&scene()).drawn((60, ROWS));
+        let plain = in_lines(&buffer, false);
+        assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
+        assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
+        assert!(plain.lines().all(|line| line.chars().count() <= 60) && !plain.contains('\u{1b}'), "{plain}");
+        assert_eq!(plain.matches('o').count(), 2 + 1, "two points and the legend: {plain}");
+        let colored = in_lines(&buffer, true);
+        let ends = |line: &str| line.rfind('\u{1b}') == line.rfind("\u{1b}[0m");
+        assert!(colored.contains("\u{1b}[34m") && colored.lines().all(ends), "{colored}");
+    }
+
+    #[test]
+    fn nothing_measured_is_drawn_too() {
+        let mut empty = scene();
+        empty.methods.clear();
+        assert!(!in_lines(&Lines::of(&empty).drawn((30, ROWS)), true).is_empty());
+    }
+
+    #[test]
+    fn the_chart_of_the_work_has_the_points_of_one_scene_and_room_below() {
+        let mut lines = Lines::default();
+        assert_eq!(lines.text((80, 24), false), "");
+        lines.add("a.toml", "path", (0.1, 0.5));
+        lines.add("a.toml", "path", (0.4, 0.1));
+        lines.add("a.toml", "whitted", (0.1, 0.01));
+        let text = lines.text((80, 24), false);
+        assert!(text.contains("o path") && text.contains("x whitted"), "{text}");
+        assert!(text.lines().count() == 16 && text.lines().all(|line| line.chars().count() < 80), "{text}");
+        assert_eq!(lines.text((80, 18), false).lines().count(), 12);
+        assert_eq!((lines.text((80, 13), false), lines.text((30, 24), false)), Default::default());
+        lines.add("b.toml", "path", (0.1, 0.5));
+        assert!(!lines.text((80, 24), false).contains("whitted"));
+    }
+}

@@ -1,0 +1,84 @@
+//! `glimt check`: is everything right that a scene names?
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::commands::info::instead_of_scene;
+use crate::console::Console;
+use crate::diagnostic_json::diagnostic;
+use crate::exit::Exit;
+use crate::output::json::in_a_line;
+use crate::pipeline::protocol::Failure;
+use crate::pipeline::{Checked, check};
+use crate::scene::report::Locator;
+
+pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
+    if is_json {
+        return in_json(scene, sets, console);
+    }
+    if let Some(exit) = instead_of_scene(scene, console) {
+        return exit;
+    }
+    match check(scene, sets) {
+        Ok(checked) => {
+            console.diagnostics(&checked.warnings);
+            console.answer(&summary(scene, &checked));
+            Exit::DONE
+        }
+        Err(Failure::Scene(diagnostics)) => {
+            console.diagnostics(&diagnostics);
+            Exit::WRONG
+        }
+        Err(Failure::Work(message)) => console.fail(Exit::FAILED, &message),
+    }
+}
+
+/// The same as one JSON object on stdout.
+fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
+    let (exit, diagnostics) = match check(scene, sets) {
+        Ok(checked) => (Exit::DONE, checked.warnings),
+        Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
+        Err(Failure::Work(message)) => return console.fail(Exit::FAILED, &message),
+    };
+    let mut places = Locator::default();
+    let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic(one, &mut places)).collect();
+    let scene = scene.to_string_lossy();
+    let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
+    match in_a_line(&report) {
+        Ok(line) => console.text(&format!("{line}\n")),
+        Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
+    }
+    exit
+}
+
+fn summary(scene: &Path, checked: &Checked) -> String {
+    let parts = [
+        count(checked.objects, "object"),
+        count(checked.triangles, "triangle"),
+        count(checked.textures, "texture"),
+        count(checked.lights, "light"),
+    ];
+    let warnings = match checked.warnings.len() as u64 {
+        0 => String::new(),
+        some => format!("; {}", count(some, "warning")),
+    };
+    format!("ok: {}: {}{warnings}", scene.display(), parts.join(", "))
+}
+
+/// A number with its noun in the right form.
+pub(crate) fn count(number: u64, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_summary_counts_in_english() {
+        let checked = Checked { objects: 1, triangles: 0, textures: 2, lights: 3, warnings: Vec::new() };
+        let text = summary(Path::new("a.toml"), &checked);
+        assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 lights");
+    }
+}

@@ -1,0 +1,378 @@
+//! `glimt compare`: the error of a picture against a reference, as a table, as JSON, as a picture.
+
+mod pictures;
+
+use std::cell::RefCell;
+use std::path::Path;
+
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+
+use crate::args::CompareArgs;
+use crate::compare::{self, Bias, Errors, Measured, PIXELS_PER_DEGREE, Pair};
+use crate::console::Console;
+use crate::control::CancelToken;
+use crate::exit::Exit;
+use crate::film::RadianceImage;
+use crate::output::part::is_part;
+use crate::output::write::{self, Guard};
+use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_one_file};
+use crate::system::threads::start_failure;
+use crate::tui::wrapped;
+
+pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
+    match ThreadPoolBuilder::new().build() {
+        Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
+        Err(error) => console.fail(Exit::FAILED, &start_failure("threads", false, &error)),
+    }
+}
+
+/// Reports errors; `Err` has their exit code.
+fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
+    let diff = args.diff.as_deref().map(|path| Diff::check(path, args, console)).transpose()?;
+    let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
+        errors.iter().for_each(|error| console.say(&format!("error: {error}")));
+        Exit::WRONG
+    })?;
+    warn_of_one_file(args, console);
+    let measured = pool.install(|| compare::measure(&pair));
+    let errors = &measured.errors;
+    let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::mean_luminance_error(path)));
+    let summary = Summary::new(args, &pair, errors, bias);
+    if args.json {
+        say_json(&summary, console);
+    } else {
+        pictures::show(&pool.install(|| pictures::lines(args, &pair, &measured)), console);
+        say_table(&summary, console);
+    }
+    if let Some(diff) = diff {
+        let written = pool.install(|| diff.write(args, &pair, &measured));
+        let lost = written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        lost.iter().for_each(|what| console.say(&format!("warning: {what}")));
+        console.say(&format!("wrote {} ({})", diff.path.display(), diff.shows()));
+    }
+    Ok(judge(&summary, console))
+}
+
+fn judge(summary: &Summary<'_>, console: &Console) -> Exit {
+    match summary.max_relmse {
+        Some(most) if !summary.is_within => {
+            let relmse = figure(summary.relmse);
+            console.fail(Exit::FAILED, &format!("relMSE is {relmse}, above the {most} of --max-relmse"))
+        }
+        Some(_) | None => Exit::DONE,
+    }
+}
+
+fn warn_of_one_file(args: &CompareArgs, console: &Console) {
+    let identity = FileIdentity::of(&args.a);
+    if identity.is_some() && identity == FileIdentity::of(&args.b) {
+        let (a, b) = (args.a.display(), args.b.display());
+        let which = if args.a == args.b {
+            format!("{a} is given twice")
+        } else {
+            format!("{a} and {b} are one file")
+        };
+        console.say(&format!(
+            "warning: {which}: there is no error, whatever it holds; name a picture and a reference"
+        ));
+    }
+}
+
+/// A picture of the error, to be written.
+struct Diff<'a> {
+    path: &'a Path,
+    format: Format,
+}
+
+impl<'a> Diff<'a> {
+    /// Reports the errors that are known before the work.
+    fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
+        let format = Format::of(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
+        check_no_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
+        output::check_target(path).map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
+        Ok(Self { path, format })
+    }
+
+    fn is_float(&self) -> bool {
+        match self.format {
+            Format::Exr | Format::Hdr => true,
+            Format::Png | Format::Jpeg | Format::Ppm | Format::WebP => false,
+        }
+    }
+
+    fn shows(&self) -> &'static str {
+        if self.is_float() {
+            "|a - b| of each channel, linear"
+        } else {
+            "FLIP of each pixel: black 0, then purple, red, orange, to pale yellow 1"
+        }
+    }
+
+    /// Writes it. Gives what of the file that was there could not be kept.
+    fn write(
+        &self,
+        args: &CompareArgs,
+        pair: &Pair,
+        measured: &Measured,
+    ) -> Result<Option<String>, OutputError> {
+        let image: RadianceImage =
+            if self.is_float() { compare::absolute(pair) } else { compare::heat(pair, &measured.flip) };
+        let note = format!("{}; a: {}, b: {}", self.shows(), args.a.display(), args.b.display());
+        let options =
+            EncodeOptions { metadata: vec![("Error".to_owned(), note)], ..EncodeOptions::default() };
+        let token = CancelToken::new();
+        let bytes = output::encode(&image, &options, self.format, &token)?;
+        let may_replace = |real: &Path| check_no_input(self.path, real, args);
+        let is_kept = |path: &Path| check_no_input(path, path, args).is_err();
+        let lost = RefCell::new(None);
+        let losses = Losses::Told(&|what| drop(lost.replace(Some(what))));
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
+        write::atomic_until(self.path, &bytes, &guard, &token)?;
+        Ok(lost.into_inner())
+    }
+}
+
+/// The target, which leads to `real`, must not be A or B.
+fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
+    if is_part(real) {
+        let reason = format!(
+            "cannot write {}: it is a part or a checkpoint; name another file with --diff FILE",
+            path.display()
+        );
+        return Err(OutputError::Refused { reason });
+    }
+    match [&args.a, &args.b].into_iter().find(|input| is_one_file(real, input)) {
+        Some(input) => {
+            let other = if path == input { String::new() } else { format!("{}, ", input.display()) };
+            let name = path.display();
+            let reason = format!(
+                "cannot write {name}: it is {other}one of the pictures compared; name another file with --diff FILE"
+            );
+            Err(OutputError::Refused { reason })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Figures for the table, and keys of the JSON object.
+#[derive(Serialize)]
+struct Summary<'a> {
+    a: String,
+    b: String,
+    width: u32,
+    height: u32,
+    rmse: f64,
+    relmse: f64,
+    relmse_trimmed: f64,
+    dropped_pixels: u64,
+    max: f64,
+    max_at: &'a [u32; 2],
+    psnr_db: f64,
+    ssim: f64,
+    flip: f64,
+    bias: Option<f64>,
+    bias_standard_error: Option<f64>,
+    bias_z: Option<f64>,
+    max_relmse: Option<f64>,
+    /// Whether relMSE is not above that.
+    is_within: bool,
+}
+
+impl<'a> Summary<'a> {
+    fn new(args: &CompareArgs, pair: &Pair, errors: &'a Errors, bias: Bias) -> Self {
+        let &Errors { rmse, relmse, relmse_trimmed, dropped_pixels, max, psnr_db, ssim, flip, .. } = errors;
+        Self {
+            a: args.a.display().to_string(),
+            b: args.b.display().to_string(),
+            width: pair.a().width,
+            height: pair.a().height,
+            rmse,
+            relmse,
+            relmse_trimmed,
+            dropped_pixels,
+            max,
+            max_at: &errors.max_at,
+            psnr_db,
+            ssim,
+            flip,
+            bias: bias.value,
+            bias_standard_error: bias.standard_error,
+            bias_z: bias.z,
+            max_relmse: args.max_relmse,
+            is_within: args.max_relmse.is_none_or(|most| relmse <= most),
+        }
+    }
+}
+
+/// A value that is not finite becomes null.
+fn say_json(summary: &Summary<'_>, console: &Console) {
+    match output::json::in_a_line(summary) {
+        Ok(text) => console.answer(&text),
+        Err(error) => console.say(&format!("error: {error}")),
+    }
+}
+
+fn say_table(summary: &Summary<'_>, console: &Console) {
+    table(summary, console.answer_columns()).iter().for_each(|line| console.answer(line));
+}
+
+/// Lines of the table, broken between words if they are wider than so many columns.
+fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
+    let Summary { a, b, width, height, .. } = summary;
+    let title = format!("{a} against the reference {b}, {width}×{height} pixels");
+    let rows = rows(summary).into_iter().flat_map(|(name, value, unit, note)| {
+        row(&format!("{name:<16}{value:>12} {unit:<4}"), &note, columns)
+    });
+    let end = "Better is: PSNR higher, SSIM nearer to 1, everything else nearer to 0.";
+    let mut lines = broken(&title, columns);
+    lines.push(String::new());
+    lines.extend(rows);
+    lines.push(String::new());
+    lines.extend(broken(end, columns));
+    lines
+}
+
+/// Figures with their description beside them, or below them if there is no room.
+fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
+    /// Narrower notes are hard to read.
+    const LEAST: usize = 24;
+    const INDENT: usize = 4;
+    let start = figures.chars().count();
+    let Some(columns) = columns else { return vec![format!("{figures}{note}").trim_end().to_owned()] };
+    let is_beside = columns >= start + LEAST;
+    let indent = if is_beside { start } else { INDENT };
+    let mut note = wrapped(note, columns.saturating_sub(indent).max(1));
+    let first = if is_beside && !note.is_empty() { note.remove(0) } else { String::new() };
+    let first = format!("{figures}{first}").trim_end().to_owned();
+    let rest = note.into_iter().map(|line| format!("{:indent$}{line}", ""));
+    std::iter::once(first).chain(rest).collect()
+}
+
+fn broken(text: &str, columns: Option<usize>) -> Vec<String> {
+    columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
+}
+
+/// A bias over its standard error from which on noise is no explanation: chance gives it once in a million times.
+const FAR_BEYOND_NOISE: f64 = 5.0;
+
+/// Name, value, unit, and what it is of.
+fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
+    let pixels = u64::from(summary.width) * u64::from(summary.height);
+    let [x, y] = summary.max_at;
+    let trimmed = format!("the same, without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
+    let place = if summary.max > 0.0 { format!(", at pixel ({x}, {y})") } else { String::new() };
+    let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels a degree; mean, 0 to 1");
+    let mut rows = vec![
+        ("RMSE", figure(summary.rmse), "", "linear".to_owned()),
+        ("relMSE", figure(summary.relmse), "", "linear: mean of (a - b)²/(b² + 0.01)".to_owned()),
+        ("relMSE, trimmed", figure(summary.relmse_trimmed), "", trimmed),
+        ("max |a - b|", figure(summary.max), "", format!("linear{place}")),
+        ("PSNR", decibels(summary.psnr_db), "dB", "clamped sRGB".to_owned()),
+        ("SSIM", format!("{:.6}", summary.ssim), "", "luma of clamped sRGB".to_owned()),
+        ("FLIP", figure(summary.flip), "", flip),
+    ];
+    if let Some(bias) = summary.bias {
+        let noise = summary
+            .bias_standard_error
+            .map_or_else(|| "noise unknown".to_owned(), |error| format!("standard error {}", figure(error)));
+        rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
+    }
+    if let Some(z) = summary.bias_z {
+        let verdict = if z.abs() > FAR_BEYOND_NOISE { ": far beyond 3, it is no noise" } else { "" };
+        rows.push(("bias, z", format!("{z:.2}"), "", format!("bias over its standard error{verdict}")));
+    }
+    rows
+}
+
+fn signed(value: f64) -> String {
+    let sign = if value < 0.0 { "-" } else { "" };
+    format!("{sign}{}", figure(value.abs()))
+}
+
+/// Six digits that count.
+fn figure(value: f64) -> String {
+    let is_short = (1e-4..1e6).contains(&value);
+    let decimals = if is_short { (5.0 - libm::log10(value).floor()).max(0.0) as usize } else { 5 };
+    match value {
+        0.0 => "0".to_owned(),
+        _ if is_short => format!("{value:.decimals$}"),
+        _ => format!("{value:.decimals$e}"),
+    }
+}
+
+fn decibels(value: f64) -> String {
+    if value.is_finite() { format!("{value:.4}") } else { "∞".to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary() -> Summary<'static> {
+        Summary {
+            a: "a/long/name/of/a/folder/picture.png".to_owned(),
+            b: "a/long/name/of/a/folder/reference.png".to_owned(),
+            width: 256,
+            height: 256,
+            rmse: 0.012_345,
+            relmse: 0.1,
+            relmse_trimmed: 0.05,
+            dropped_pixels: 64,
+            max: 1.0,
+            max_at: &[3, 4],
+            psnr_db: 31.25,
+            ssim: 0.9,
+            flip: 0.1,
+            bias: Some(0.01),
+            bias_standard_error: Some(0.02),
+            bias_z: Some(0.5),
+            max_relmse: None,
+            is_within: true,
+        }
+    }
+
+    #[test]
+    fn a_table_is_as_wide_as_the_terminal_and_breaks_between_words() {
+        let summary = summary();
+        let words =
+            |lines: &[String]| lines.join(" ").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let whole = table(&summary, None);
+        assert!(whole.iter().any(|line| line.contains("0.1 %: 64 of 65536 pixels")), "{whole:?}");
+        for columns in [200, 120, 80, 60, 50, 40] {
+            let lines = table(&summary, Some(columns));
+            let widest = lines.iter().map(|line| line.chars().count()).max();
+            assert!(widest.is_some_and(|widest| widest <= columns), "{columns}: {lines:#?}");
+            assert_eq!(words(&lines), words(&whole), "{columns}");
+        }
+    }
+
+    #[test]
+    fn a_bias_that_chance_explains_is_not_said_to_be_none() {
+        for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
+            let lines = table(&Summary { bias_z: Some(z), ..summary() }, None);
+            let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");
+            assert_eq!(line.contains("far beyond 3"), is_far, "{line}");
+        }
+    }
+
+    #[test]
+    fn figures_have_the_digits_that_count() {
+        let cases = [
+            (0.0, "0"),
+            (0.012_345_678, "0.0123457"),
+            (0.000_2, "0.000200000"),
+            (1.5, "1.50000"),
+            (123.456_789, "123.457"),
+            (123_456.7, "123457"),
+            (999_999.9, "1000000"),
+            (1.234_5e-7, "1.23450e-7"),
+            (5e30, "5.00000e30"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(figure(value), text);
+        }
+        assert_eq!(decibels(f64::INFINITY), "∞");
+        assert_eq!(decibels(31.25), "31.2500");
+    }
+}

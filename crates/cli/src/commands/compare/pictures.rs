@@ -1,0 +1,88 @@
+//! The pictures and their difference in the terminal, above the table.
+
+use std::io::IsTerminal;
+use std::path::Path;
+
+use super::figure;
+use crate::args::{CompareArgs, Pictures};
+use crate::compare::{self, Measured, Pair};
+use crate::console::Console;
+use crate::film::RadianceImage;
+use crate::film::tone::{ToneMapping, develop};
+use crate::scene::sanitize::visible;
+use crate::tui::{Named, printed};
+
+/// Less FLIP than this is hardly seen in its colours.
+const FAINT: f32 = 0.1;
+
+/// Lines for stdout; none if the terminal has no room.
+pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> String {
+    let is_terminal = std::io::stdout().is_terminal();
+    let is_wanted = match args.pictures {
+        Pictures::Auto => is_terminal,
+        Pictures::On => true,
+        Pictures::Off => false,
+    };
+    if !is_wanted {
+        return String::new();
+    }
+    let (difference, words) = difference(pair, measured);
+    let pictures = [
+        named(&name(&args.a), pair.a()),
+        named(&format!("{}, the reference", name(&args.b)), pair.b()),
+        named(&words, &difference),
+    ];
+    printed(&pictures, args.color, is_terminal)
+}
+
+pub(super) fn show(lines: &str, console: &Console) {
+    if !lines.is_empty() {
+        console.text(&format!("{lines}\n"));
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// An image as a display shows it, with its name.
+fn named(name: &str, image: &RadianceImage) -> Named {
+    Named { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
+}
+
+/// FLIP in colours; if that is all but black, |a - b| as bright as it can be shown.
+fn difference(pair: &Pair, measured: &Measured) -> (RadianceImage, String) {
+    let errors = &measured.errors;
+    if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= FAINT) {
+        return (compare::heat(pair, &measured.flip), "FLIP".to_owned());
+    }
+    let mut image = compare::absolute(pair);
+    let scale = (1.0 / errors.max) as f32;
+    image.pixels.iter_mut().for_each(|pixel| *pixel *= scale);
+    (image, format!("|a - b|, white: {}", figure(errors.max)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    fn shown(b: f32) -> (RadianceImage, String) {
+        let image =
+            |value| RadianceImage { width: 2, height: 1, pixels: vec![Vec3::splat(0.5), Vec3::splat(value)] };
+        let pair = Pair::new([Path::new("a"), Path::new("b")], image(0.5), image(b)).expect("a pair");
+        difference(&pair, &compare::measure(&pair))
+    }
+
+    #[test]
+    fn the_difference_is_what_can_be_seen() {
+        assert_eq!(shown(0.0).1, "FLIP");
+        assert_eq!(shown(0.5).1, "FLIP", "black for nothing");
+        let (faint, words) = shown(0.501);
+        assert!(
+            words.starts_with("|a - b|, white: 0.000999") || words.starts_with("|a - b|, white: 0.00100"),
+            "{words}"
+        );
+        assert!(faint.pixels[0] == Vec3::ZERO && (faint.pixels[1].x - 1.0).abs() < 1e-5, "{faint:?}");
+    }
+}

@@ -1,0 +1,87 @@
+//! `glimt completions`: the script that makes a shell complete, and the calls that the script makes.
+//!
+//! The script asks the program at each press of the key, so that it knows the tables, names and keys of the scene in the line.
+
+mod bash;
+mod powershell;
+
+use std::ffi::OsString;
+
+use clap::CommandFactory;
+use clap_complete::CompleteEnv;
+use clap_complete::env::{Elvish, EnvCompleter, Fish, Shells, Zsh};
+
+use self::bash::Bash;
+use self::powershell::Powershell;
+
+use crate::args::{Args, Shell};
+use crate::console::Console;
+use crate::exit::Exit;
+
+/// The variable that a script sets to the name of its shell.
+const VARIABLE: &str = "GLIMT_COMPLETE";
+
+/// The script for zsh, in place of `clap_complete`'s, which puts a space behind `KEY=`.
+const ZSH: &str = r#"#compdef glimt
+_glimt_complete() {
+    local answer=("${(@f)$(
+        _CLAP_IFS=$'\n' _CLAP_COMPLETE_INDEX=$((CURRENT - 1)) GLIMT_COMPLETE=zsh glimt -- "${words[@]}" 2> /dev/null
+    )}")
+    local -a folders=() begun=() whole=()
+    local line value
+    # A description stands behind the first colon.
+    for line in $answer; do
+        value=${line%%:*}
+        case $value in
+            */) folders+=("${value%/}${line#"$value"}") ;;
+            *=) begun+=("$line") ;;
+            *) whole+=("$line") ;;
+        esac
+    done
+    (($#folders)) && _describe -V values folders -S / -r /
+    (($#begun)) && _describe -V values begun -S ''
+    (($#whole)) && _describe -V values whole
+}
+compdef _glimt_complete glimt
+# In a folder of `fpath`, zsh reads this when the key is pressed first, as a function of the file's name.
+if [[ $funcstack[1] == _glimt ]]; then
+    _glimt_complete "$@"
+fi
+"#;
+
+/// Prints the script of a shell.
+pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
+    let completer: &dyn EnvCompleter = match shell {
+        Shell::Bash => &Bash,
+        Shell::Zsh => {
+            console.text(ZSH);
+            return Exit::DONE;
+        }
+        Shell::Fish => &Fish,
+        Shell::Powershell => &Powershell,
+        Shell::Elvish => &Elvish,
+    };
+    let mut script = Vec::new();
+    match completer.write_registration(VARIABLE, "glimt", "glimt", "glimt", &mut script) {
+        Ok(()) => {
+            console.text(&String::from_utf8_lossy(&script));
+            Exit::DONE
+        }
+        Err(error) => console.fail(Exit::FAILED, &format!("cannot make the script: {error}")),
+    }
+}
+
+/// Answers a call of a shell's script. `None` if the call is not one.
+pub(crate) fn answer(arguments: &[OsString]) -> Option<Exit> {
+    std::env::var_os(VARIABLE)?;
+    let folder = std::env::current_dir().ok();
+    let shells = Shells(&[&Bash, &Elvish, &Fish, &Powershell, &Zsh]);
+    let complete = CompleteEnv::with_factory(Args::command).var(VARIABLE).shells(shells);
+    let complete = complete.bin("glimt").completer("glimt");
+    match complete.try_complete(arguments, folder.as_deref()) {
+        Ok(true) => Some(Exit::DONE),
+        Ok(false) => None,
+        // The shell shows nothing of it.
+        Err(_) => Some(Exit::FAILED),
+    }
+}

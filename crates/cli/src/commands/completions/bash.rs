@@ -1,0 +1,237 @@
+//! bash: its script, and candidates quoted as the line has to have them.
+//!
+//! bash puts candidates on the line as they are, so that a name with `$(…)` in it would run with the line. `clap_complete`'s adapter
+//! leaves quoting to nobody. This one gets the line itself: it reads words as bash does, without expanding anything, and quotes what
+//! replaces the last one.
+
+use std::ffi::OsString;
+use std::io::{Error, Write};
+use std::path::Path;
+
+use clap_complete::engine::complete;
+use clap_complete::env::EnvCompleter;
+
+use crate::args::candidates::remember;
+
+/// The script. `$2` is what the candidates replace: the end of the line behind the last blank, `=`, `:` or open quote.
+const SCRIPT: &str = r#"_glimt_complete() {
+    local answer line space=true
+    compopt +o nospace 2> /dev/null && space=false
+    COMPREPLY=()
+    answer=$(GLIMT_COMPLETE=bash "glimt" -- "${COMP_LINE:0:COMP_POINT}" "$2") || return
+    # Candidates come quoted, one a line.
+    while IFS= read -r line; do
+        [[ -n $line ]] && COMPREPLY+=("$line")
+    done <<< "$answer"
+    if [[ $space == false && "${COMPREPLY-}" =~ [=/:]$ ]]; then
+        compopt -o nospace
+    fi
+}
+if [[ "${BASH_VERSINFO[0]}" -eq 4 && "${BASH_VERSINFO[1]}" -ge 4 || "${BASH_VERSINFO[0]}" -gt 4 ]]; then
+    complete -o nospace -o bashdefault -o nosort -F _glimt_complete glimt
+else
+    complete -o nospace -o bashdefault -F _glimt_complete glimt
+fi
+"#;
+
+/// The adapter for bash. Its script passes the line up to the cursor, and the part at its end that a candidate replaces.
+pub(super) struct Bash;
+
+impl EnvCompleter for Bash {
+    fn name(&self) -> &'static str {
+        "bash"
+    }
+
+    fn is(&self, name: &str) -> bool {
+        name == "bash"
+    }
+
+    fn write_registration(
+        &self,
+        _variable: &str,
+        _name: &str,
+        _bin: &str,
+        _completer: &str,
+        out: &mut dyn Write,
+    ) -> Result<(), Error> {
+        out.write_all(SCRIPT.as_bytes())
+    }
+
+    fn write_complete(
+        &self,
+        command: &mut clap::Command,
+        args: Vec<OsString>,
+        folder: Option<&Path>,
+        out: &mut dyn Write,
+    ) -> Result<(), Error> {
+        let text = |at: usize| args.get(at).and_then(|arg| arg.to_str());
+        let (Some(line), Some(replaced)) = (text(0), text(1)) else { return Ok(()) };
+        let Some(before) = line.strip_suffix(replaced) else { return Ok(()) };
+        // Read the words, and how the place is quoted where candidates go.
+        let words: Vec<OsString> = read(line).words.into_iter().map(OsString::from).collect();
+        let kept = read(before);
+        let begun = if before.ends_with(is_blank) && kept.quote == Quote::None {
+            ""
+        } else {
+            kept.words.last().map_or("", String::as_str)
+        };
+        let keeps_home = kept.quote == Quote::None && replaced.starts_with("~/");
+        remember(&words);
+        let last = words.len().saturating_sub(1);
+        for candidate in complete(command, words, last, folder)? {
+            let rest = candidate.get_value().to_str().and_then(|value| value.strip_prefix(begun));
+            if let Some(quoted) = rest.and_then(|rest| quoted(rest, kept.quote, keeps_home)) {
+                writeln!(out, "{quoted}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Quotes around a place in a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Quote {
+    None,
+    Single,
+    Double,
+}
+
+/// Words of a line without their quotes, and the quote that is open at its end. The last word is empty after a blank.
+struct Line {
+    words: Vec<String>,
+    quote: Quote,
+}
+
+fn is_blank(character: char) -> bool {
+    matches!(character, ' ' | '\t' | '\n')
+}
+
+/// Takes a line apart as bash does; expansions stay as they are written.
+fn read(line: &str) -> Line {
+    let mut words = vec![String::new()];
+    let mut quote = Quote::None;
+    let mut characters = line.trim_start_matches(is_blank).chars().peekable();
+    while let Some(character) = characters.next() {
+        let mut taken = Some(character);
+        match (quote, character) {
+            (Quote::None, blank) if is_blank(blank) => {
+                while characters.next_if(|next| is_blank(*next)).is_some() {}
+                words.push(String::new());
+                taken = None;
+            }
+            (Quote::None, '\\') => taken = characters.next(),
+            (Quote::None, '\'') => (quote, taken) = (Quote::Single, None),
+            (Quote::None, '"') => (quote, taken) = (Quote::Double, None),
+            (Quote::Single, '\'') | (Quote::Double, '"') => (quote, taken) = (Quote::None, None),
+            (Quote::Double, '\\') => {
+                taken = Some(characters.next_if(|next| "$`\"\\".contains(*next)).unwrap_or('\\'));
+            }
+            (Quote::None | Quote::Single | Quote::Double, _) => {}
+        }
+        if let (Some(word), Some(taken)) = (words.last_mut(), taken) {
+            word.push(taken);
+        }
+    }
+    Line { words, quote }
+}
+
+/// A candidate as the line has to have it at a place with this quote open. `None` if it cannot stand there.
+fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
+    let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
+    if text.chars().any(char::is_control) {
+        // Between quotes there is no way to write these.
+        return (quote == Quote::None)
+            .then(|| format!("$'{}'", text.chars().map(escaped).collect::<String>()));
+    }
+    let mut out = String::new();
+    for (at, character) in text.chars().enumerate() {
+        match quote {
+            Quote::None if is_plain(character) || (keeps_home && at == 0 && character == '~') => {}
+            Quote::None => out.push('\\'),
+            Quote::Single if character == '\'' => {
+                out.push_str(r"'\''");
+                continue;
+            }
+            Quote::Single => {}
+            // A backslash before it would stay.
+            Quote::Double if character == '!' => {
+                out.push_str(r#""\!""#);
+                continue;
+            }
+            Quote::Double if "$`\"\\".contains(character) => out.push('\\'),
+            Quote::Double => {}
+        }
+        out.push(character);
+    }
+    Some(out)
+}
+
+/// A character between `$'` and `'`.
+fn escaped(character: char) -> String {
+    match character {
+        '\'' | '\\' => format!("\\{character}"),
+        // Octal, of at most three digits, takes nothing of what follows.
+        control if control.is_ascii_control() => format!("\\{:03o}", u32::from(control)),
+        control if control.is_control() => format!("\\u{:04x}", u32::from(control)),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whatever a name holds, bash reads it as that one word.
+    #[test]
+    fn bash_reads_back_what_is_quoted() {
+        let names = [
+            "plain.toml",
+            "my scene.toml",
+            "$(touch x)",
+            "`touch x`",
+            "a;b&c|d>e<f",
+            "it's",
+            "say \"hi\"",
+            "back\\slash",
+            "k*?[a]",
+            "~tilde",
+            "#hash",
+            "a!b",
+            "{a,b}",
+            "é 😀",
+            "new\nline",
+            "esc\u{1b}]0;x\u{7}1",
+            "c1\u{9b}5",
+            "tab\there",
+            "a=b:c",
+        ];
+        for (open, close, quote) in
+            [("", "", Quote::None), ("'", "'", Quote::Single), ("\"", "\"", Quote::Double)]
+        {
+            for name in names {
+                let Some(text) = quoted(name, quote, false) else {
+                    assert!(quote != Quote::None && name.chars().any(char::is_control), "{name:?}");
+                    continue;
+                };
+                let line = format!("printf '%s\\0' {open}{text}{close}");
+                let mut bash = std::process::Command::new("bash");
+                let output =
+                    bash.args(["--norc", "-c", &line]).env("LC_ALL", "C.UTF-8").output().expect("bash");
+                assert_eq!(String::from_utf8(output.stdout).expect("UTF-8"), format!("{name}\0"), "{line}");
+                if !name.chars().any(char::is_control) {
+                    assert_eq!(read(&line).words.last().map(String::as_str), Some(name), "{line}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lines_are_read_as_bash_reads_them() {
+        let line = read("glimt  --set a=\"b c\"\\ d 'e\\' \"f\\$\\g ");
+        assert_eq!(line.words, ["glimt", "--set", "a=b c d", "e\\", "f$\\g "]);
+        assert_eq!(line.quote, Quote::Double);
+        assert_eq!(read("glimt ").words, ["glimt", ""]);
+        assert_eq!(read("glimt 'x").quote, Quote::Single);
+        assert_eq!(quoted("~/a b", Quote::None, true).as_deref(), Some("~/a\\ b"));
+    }
+}

@@ -1,0 +1,137 @@
+//! `glimt doctor`: what the program finds where it runs.
+
+use std::env::consts::{ARCH, OS};
+use std::path::Path;
+
+use crate::accel::wide_bvh::InstructionSet;
+use crate::bench::cache;
+use crate::commands::check::count;
+use crate::console::Console;
+use crate::exit::Exit;
+use crate::tui::{self, Answers, ColorDepth, Probe, probe};
+
+/// Prints a line for each finding.
+pub(crate) fn run(console: &Console) -> Exit {
+    let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
+    lines.extend([("processor", processor()), ("threads", threads())]);
+    match probe() {
+        Some(probe) => lines.extend(terminal(&probe)),
+        None => lines.push(("terminal", "none: stdin and stdout are not one; `--once` works".to_owned())),
+    }
+    lines.extend([("editor", editor()), ("cache", cache_folder())]);
+    for (name, finding) in lines {
+        console.answer(&format!("{name:<12}{finding}"));
+    }
+    Exit::DONE
+}
+
+fn variable(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
+}
+
+fn processor() -> String {
+    let words = |instructions| match instructions {
+        InstructionSet::Portable => "no vector instructions that glimt uses",
+        InstructionSet::Avx2 => "AVX2",
+        InstructionSet::Avx512 => "AVX-512",
+    };
+    let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.available());
+    match variable("GLIMT_SIMD") {
+        Some(asked) => format!("{} by GLIMT_SIMD={asked}; it has {}", words(used), words(best)),
+        None => words(used).to_owned(),
+    }
+}
+
+fn threads() -> String {
+    match std::thread::available_parallelism() {
+        Ok(threads) => format!("{threads}, as many as a render uses"),
+        Err(error) => format!("unknown ({error}): a render uses one"),
+    }
+}
+
+/// The lines about a terminal.
+fn terminal(probe: &Probe) -> Vec<(&'static str, String)> {
+    let term = variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
+    let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
+    let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
+    let size = match (columns, rows) {
+        (0, _) | (_, 0) => "of unknown size".to_owned(),
+        _ => format!("{columns} × {rows} cells of {width} × {height} pixels"),
+    };
+    let way = match (probe.is_multiplexed, probe.is_remote) {
+        (true, true) => ", in tmux or screen, over SSH",
+        (true, false) => ", in tmux or screen",
+        (false, true) => ", over SSH",
+        (false, false) => "",
+    };
+    let terminal = format!("{}, {size}{way}", name.map_or(term.clone(), |name| format!("{name} ({term})")));
+    let mut lines = vec![("terminal", terminal), ("colours", colours(probe)), ("preview", preview(probe))];
+    lines.push(("round trip", round_trip(probe.answers.as_ref())));
+    lines
+}
+
+fn colours(probe: &Probe) -> String {
+    let depth = match probe.depth {
+        ColorDepth::TrueColor => "24 bits",
+        ColorDepth::Indexed256 => "256",
+        ColorDepth::Ansi16 => "16",
+        ColorDepth::None => "none",
+    };
+    let says_more = probe.answers.as_ref().is_some_and(|answers| answers.has_true_color);
+    let asked =
+        if says_more && probe.depth != ColorDepth::TrueColor { "; the terminal reports 24 bits" } else { "" };
+    let background = probe.answers.as_ref().and_then(|answers| answers.background);
+    let background = background
+        .map_or(String::new(), |[red, green, blue]| format!("; background #{red:02x}{green:02x}{blue:02x}"));
+    format!("{depth} by the environment{asked}{background}")
+}
+
+fn preview(probe: &Probe) -> String {
+    let protocol = |name, is_there| if is_there { Some(name) } else { None };
+    let answers = probe.answers.clone().unwrap_or_default();
+    let pixels = [
+        protocol("kitty", answers.has_kitty),
+        protocol("sixel", answers.has_sixel),
+        protocol("iterm2", probe.has_iterm),
+    ];
+    let pixels: Vec<&str> = pixels.into_iter().flatten().collect();
+    let more = match pixels.as_slice() {
+        [] => "no protocol for pixels".to_owned(),
+        some => format!("pixels with --preview {}", some.join(" or ")),
+    };
+    format!("{}; {more}", probe.preview())
+}
+
+fn round_trip(answers: Option<&Answers>) -> String {
+    let Some(answers) = answers else { return "the terminal does not answer".to_owned() };
+    let whole = if answers.is_synchronized { "; frames appear at once" } else { "" };
+    format!("{:.1} ms{whole}", answers.round_trip.as_secs_f64() * 1e3)
+}
+
+fn editor() -> String {
+    match tui::editor(|name| std::env::var(name).ok()) {
+        (editor, Some(variable)) => format!("{editor}, by {variable}"),
+        (editor, None) => format!("{editor}: neither VISUAL nor EDITOR is set"),
+    }
+}
+
+fn cache_folder() -> String {
+    let Some(folder) = cache::folder() else {
+        return "none: neither XDG_CACHE_HOME nor HOME is set".to_owned();
+    };
+    let name = folder.display();
+    match std::fs::read_dir(&folder) {
+        Ok(entries) => {
+            let sizes: Vec<u64> =
+                entries.filter_map(|entry| Some(entry.ok()?.metadata().ok()?.len())).collect();
+            let bytes = sizes.iter().sum::<u64>();
+            format!("{name}: {}, {:.1} MB", count(sizes.len() as u64, "file"), bytes as f64 / 1e6)
+        }
+        Err(_) if !exists(&folder) => format!("{name}: not there yet, `bench` makes it"),
+        Err(error) => format!("{name}: cannot be read: {error}"),
+    }
+}
+
+fn exists(folder: &Path) -> bool {
+    folder.symlink_metadata().is_ok()
+}

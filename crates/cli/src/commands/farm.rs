@@ -1,0 +1,384 @@
+//! `glimt farm`: the script by which a program that people have spreads the parts of a picture over machines.
+
+use std::path::Path;
+
+use clap::Parser;
+
+use crate::args::{Args, Engine, FarmArgs, RenderArgs, Switch};
+use crate::console::Console;
+use crate::exit::Exit;
+use crate::output::Format;
+use crate::pipeline::memory_needed;
+use crate::pipeline::protocol::Failure;
+use crate::system::text::is_plain;
+
+pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
+    if let Err(error) = Format::of(&args.output) {
+        return console.fail(Exit::WRONG, &error.to_string());
+    }
+    let paths = [args.scene.to_str(), args.output.to_str()];
+    let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
+    // A line of a name could end a document in the script, and a script is shown on terminals.
+    let words = words.chain([args.image.as_str(), args.claim.as_str()]);
+    if paths.contains(&None) || words.into_iter().any(|word| !is_plain_word(word)) {
+        return console
+            .fail(Exit::WRONG, "a script cannot hold this name: use names of letters, digits, - and _");
+    }
+    if !args.scene.is_file() {
+        return console.fail(Exit::WRONG, &format!("{}: no such file", args.scene.display()));
+    }
+    let options = match check_options(args) {
+        Ok(options) => options,
+        Err(message) => return console.fail(Exit::WRONG, &format!("behind `--`: {message}")),
+    };
+    console.text(&match args.engine {
+        Engine::Slurm => slurm(args),
+        Engine::Parallel => parallel(args),
+        Engine::Kubernetes => kubernetes(args, memory(args, &options, console)),
+    });
+    Exit::DONE
+}
+
+/// Whether a script can hold a word and a terminal show it.
+fn is_plain_word(word: &str) -> bool {
+    word.chars().all(is_plain)
+}
+
+/// Reads the options of every render as the renders will.
+///
+/// # Errors
+/// One is unknown or wrong, or is not the same for all parts.
+fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
+    let (program, scene) = ("glimt".to_owned(), file(&args.scene));
+    let words = [program, scene].into_iter().chain(args.options.iter().cloned());
+    let render = match Args::try_parse_from(words) {
+        Ok(Args { command: None, render }) => render,
+        Ok(Args { command: Some(_), .. }) => return Err("a command is no option of a render".to_owned()),
+        Err(error) => return Err(first_words(&error)),
+    };
+    let photons_by_error =
+        render.photons == Some(Switch::On) && render.error.is_some_and(|error| error > 0.0);
+    let faults = [
+        (
+            !render.outputs.is_empty(),
+            "-o names the image, in front of the `--`; each part has a name of its own",
+        ),
+        (render.shard.is_some(), "--shard is given to each part by the script"),
+        (render.once, "--once is given to each part by the script"),
+        (render.resume, "--resume is given to each part by the script"),
+        (render.report.is_some(), "--report would be one file for all parts"),
+        (render.time.is_some(), "--time has no parts: machines differ in speed"),
+        (photons_by_error, "photons with a noise threshold have no parts: each pass judges the whole image"),
+    ];
+    match faults.iter().find(|(is_there, _)| *is_there) {
+        Some((_, message)) => Err((*message).to_owned()),
+        None => Ok(render),
+    }
+}
+
+/// Returns the mebibytes that a container needs: the memory of a part plus a quarter. `None`, with a warning, if the scene cannot be read.
+fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
+    let mut overrides = options.overrides();
+    (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
+    let why = match memory_needed(&args.scene, &overrides) {
+        Ok(bytes) => return Some((bytes + bytes / 4).div_ceil(1 << 20)),
+        Err(Failure::Work(why)) => why,
+        Err(Failure::Scene(diagnostics)) => {
+            console.diagnostics(&diagnostics);
+            "the scene has errors".to_owned()
+        }
+    };
+    console.say(&format!("warning: the jobs state no memory: {why}"));
+    None
+}
+
+/// The words of an error about arguments, without the usage below them.
+fn first_words(error: &clap::Error) -> String {
+    if !error.use_stderr() {
+        return "--help and --version are no options of a render".to_owned();
+    }
+    let text = error.to_string();
+    let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
+}
+
+/// One word for a shell, for glimt no option and no command.
+fn word(text: &str) -> String {
+    shlex::try_quote(text).map_or_else(|_| text.to_owned(), |quoted| quoted.into_owned())
+}
+
+fn file(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    let is_bare = text.starts_with('-') || !text.contains(['/', '.']);
+    if is_bare { format!("./{text}") } else { text.into_owned() }
+}
+
+/// The call that renders one part; `index` stands for its number in a shell, outside of quotes.
+fn render(args: &FarmArgs, index: &str) -> String {
+    let (scene, part) = (word(&file(&args.scene)), part(args, index));
+    let options: String = args.options.iter().map(|option| format!(" {}", word(option))).collect();
+    format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
+}
+
+/// The file of one part.
+fn part(args: &FarmArgs, index: &str) -> String {
+    format!("{}.{index}.part", word(&file(&args.output)))
+}
+
+/// The call that joins the parts, whose names are the words that this shell command prints.
+fn merge(args: &FarmArgs, options: &str) -> String {
+    let (out, count) = (word(&file(&args.output)), args.shards);
+    format!("seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}", word(&escaped(args)))
+}
+
+/// The output in a format of `seq`.
+fn escaped(args: &FarmArgs) -> String {
+    file(&args.output).replace('%', "%%")
+}
+
+fn slurm(args: &FarmArgs) -> String {
+    let (count, render, merge) = (args.shards, render(args, "$SLURM_ARRAY_TASK_ID"), merge(args, ""));
+    format!(
+        "\
+#!/bin/sh
+# Renders in {count} parts and joins them. Give this to a shell in the folder where the paths hold.
+# A job that is preempted or near its time limit saves a checkpoint, is queued again, and goes on from there.
+set -eu
+parts=$(sbatch --parsable --job-name=glimt --array=1-{count} --requeue --signal=B:USR1@60 <<'JOB'
+#!/bin/sh
+{render} &
+trap 'kill -TERM $!; wait $!' TERM
+trap 'kill -TERM $!; wait $!; scontrol requeue ${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID' USR1
+wait $!
+JOB
+)
+merge=$(sbatch --parsable --job-name=glimt-merge --kill-on-invalid-dep=yes --dependency=afterok:\"${{parts%%;*}}\" <<'JOB'
+#!/bin/sh
+{merge}
+JOB
+)
+echo \"parts: job $parts; merge: job $merge\"
+"
+    )
+}
+
+fn parallel(args: &FarmArgs) -> String {
+    let (count, merge) = (args.shards, merge(args, ""));
+    // Each line that parallel reads is a command: in a template it would take parts of names for its own.
+    let index = "\u{0}";
+    let render: Vec<String> = render(args, index).split(index).map(word).collect();
+    let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
+    let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", word(host))).collect();
+    let way = if args.hosts.is_empty() { "" } else { " --workdir \"$PWD\"" };
+    format!(
+        "\
+#!/bin/sh
+# Renders in {count} parts, one at a time on each machine, and joins them. A part that is killed is tried again. Called again,
+# the script goes on where it was: finished parts stay, and glimt refuses to replace those of another scene or other options.
+set -eu
+seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
+    parallel --jobs 1 --retries 3 --halt soon,fail=1{way}{hosts}
+{merge}
+"
+    )
+}
+
+fn kubernetes(args: &FarmArgs, mebibytes: Option<u64>) -> String {
+    let (count, render, merge) =
+        (args.shards, render(args, "$index"), merge(args, "--watch --progress plain "));
+    let (image, claim) = (yaml(&args.image), yaml(&args.claim));
+    let render = command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
+    let resources = mebibytes.map_or(String::new(), |size| {
+        format!(
+            "        resources:\n          requests:\n            memory: {size}Mi\n          limits:\n            memory: {size}Mi\n"
+        )
+    });
+    let job = |name: &str, indexed: &str, command: &str| {
+        format!(
+            "\
+apiVersion: batch/v1
+kind: Job
+metadata:
+  name: {name}
+spec:
+{indexed}  backoffLimit: 6
+  template:
+    spec:
+      restartPolicy: OnFailure
+      containers:
+      - name: glimt
+        image: {image}
+        workingDir: /work
+        command: [\"sh\", \"-c\", {command}]
+{resources}        volumeMounts:
+        - name: work
+          mountPath: /work
+      volumes:
+      - name: work
+        persistentVolumeClaim:
+          claimName: {claim}
+"
+        )
+    };
+    let indexed = format!("  completions: {count}\n  parallelism: {count}\n  completionMode: Indexed\n");
+    format!(
+        "# Renders in {count} parts and joins them: kubectl apply -f -\n{}---\n{}",
+        job("glimt", &indexed, &render),
+        job("glimt-merge", "", &command(&merge))
+    )
+}
+
+/// A command of a container. Kubernetes puts variables in the place of `$(NAME)`, and `$` in that of `$$`.
+fn command(text: &str) -> String {
+    yaml(&text.replace('$', "$$"))
+}
+
+/// A text as YAML holds it: a string of JSON is one.
+fn yaml(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::args::{Args, Subcommand};
+
+    fn args(line: &str) -> FarmArgs {
+        let words = shlex::split(&format!("glimt farm {line}")).expect("words");
+        match Args::try_parse_from(words).expect("right").command {
+            Some(Subcommand::Farm(args)) => *args,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn words_with_control_characters_are_refused() {
+        for word in ["a\nb", "\0", "\u{1b}]52;c;eA==\u{7}", "\u{9b}31m", "\u{202e}gnp.exr", "a\tb", "\r"] {
+            assert!(!is_plain_word(word), "{word:?}");
+        }
+        for word in ["", "my scene.toml", "Würfel.exr", "$(x) `y` 'z'"] {
+            assert!(is_plain_word(word), "{word:?}");
+        }
+    }
+
+    #[test]
+    fn names_are_words_of_a_shell() {
+        let args = args("'my scene.toml' -o \"it's 5% $HOME.exr\" --shards 3 --engine slurm -- --samples 8");
+        let call = render(&args, "1");
+        let words = shlex::split(&call).expect("words");
+        assert_eq!(&words[..5], ["glimt", "my scene.toml", "--once", "-o", "it's 5% $HOME.exr.1.part"]);
+        assert_eq!(&words[words.len() - 2..], ["--samples", "8"]);
+        let joined = shlex::split(&merge(&args, "")).expect("words");
+        assert!(joined.contains(&"it's 5%% $HOME.exr.%.0f.part".to_owned()), "{joined:?}");
+    }
+
+    #[test]
+    fn parallel_reads_whole_commands() {
+        let name = "{= `touch pwned` =}{}{1} it's.toml";
+        let args = args(&format!("{} -o 'a {{}}.exr' --shards 2 --engine parallel", word(name)));
+        let script = parallel(&args);
+        let lines = script.lines().find(|line| line.starts_with("seq 2 | while")).expect("the commands");
+        let lines = lines.strip_suffix(" |").expect("a pipe");
+        let printed = std::process::Command::new("sh").args(["-c", lines]).output().expect("a shell");
+        let printed = String::from_utf8(printed.stdout).expect("text");
+        let second = shlex::split(printed.lines().nth(1).expect("two parts")).expect("words");
+        assert_eq!(&second[1..], [name, "--once", "-o", "a {}.exr.2.part", "--shard", "2/2", "--resume"]);
+    }
+
+    #[test]
+    fn options_are_those_of_a_render_and_the_same_for_all_parts() {
+        let said = |options: &str| {
+            let args = args(&format!("a.toml -o a.exr --shards 2 --engine slurm -- {options}"));
+            check_options(&args).err().unwrap_or_default()
+        };
+        for (options, words) in [
+            ("-o x.png", "-o names the image"),
+            ("--shard 1/3", "--shard is given"),
+            ("--once", "--once is given"),
+            ("--resume", "--resume is given"),
+            ("--report r.json", "one file for all parts"),
+            ("--time 3", "--time has no parts"),
+            ("--photons on --error 0.1", "photons with a noise threshold"),
+            ("--sample 3", "unexpected argument '--sample'"),
+            ("--samples 0", "invalid value '0'"),
+            ("--samples 3 --samples 4", "--samples"),
+            ("another.toml", "another.toml"),
+            ("check b.toml", ""),
+            ("--help", "--help"),
+        ] {
+            let said = said(options);
+            assert!(!said.is_empty() && said.contains(words) && !said.contains('\n'), "{options}: {said:?}");
+        }
+        for options in
+            ["", "--samples 9 --integrator path --error 0.1", "--photons on", "--checkpoint 5 --threads 2"]
+        {
+            assert_eq!(said(options), "", "{options}");
+        }
+    }
+
+    /// A command as Kubernetes hands it on: `$(NAME)` is the variable of that name, if there is one; `$$` is `$`
+    /// (k8s.io/kubernetes/third_party/forked/golang/expansion).
+    fn expanded(text: &str, variables: &[(&str, &str)]) -> String {
+        let (mut out, mut rest) = (String::new(), text);
+        while let Some(at) = rest.find('$') {
+            out += &rest[..at];
+            rest = &rest[at + 1..];
+            if let Some(after) = rest.strip_prefix('$') {
+                out.push('$');
+                rest = after;
+            } else if let Some((name, after)) = rest.strip_prefix('(').and_then(|rest| rest.split_once(')')) {
+                let known = variables.iter().find(|(known, _)| *known == name);
+                out += &known.map_or(format!("$({name})"), |(_, value)| (*value).to_owned());
+                rest = after;
+            } else {
+                out.push('$');
+            }
+        }
+        out + rest
+    }
+
+    #[test]
+    fn names_survive_kubernetes_and_its_shell() {
+        let (scene, picture) = ("$(HOME) $$ $$(HOME).toml", "o $$ $(JOB_COMPLETION_INDEX).exr");
+        let args = args(&format!("{} -o {} --shards 8 --engine kubernetes", word(scene), word(picture)));
+        let script = kubernetes(&args, None);
+        let commands: Vec<String> = script
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("command: "))
+            .map(|command| {
+                let words: Vec<String> = serde_json::from_str(command).expect("a list of strings");
+                expanded(&words[2], &[("HOME", "/root"), ("JOB_COMPLETION_INDEX", "3")])
+            })
+            .collect();
+        assert_eq!(commands.len(), 2);
+        let print = commands[0].replace("exec glimt", "printf '%s\\n'");
+        assert_ne!(print, commands[0]);
+        let printed = std::process::Command::new("sh")
+            .env("JOB_COMPLETION_INDEX", "3")
+            .args(["-c", &print])
+            .output()
+            .expect("a shell");
+        let printed = String::from_utf8(printed.stdout).expect("text");
+        let words: Vec<&str> = printed.lines().collect();
+        let part = format!("{picture}.4.part");
+        assert_eq!(words, [scene, "--once", "-o", &part, "--shard", "4/8", "--resume"]);
+    }
+
+    #[test]
+    fn a_job_of_kubernetes_is_yaml_with_strings_of_json() {
+        let args = args("a.toml -o 'a \"b\".exr' --shards 8 --engine kubernetes");
+        let bare = kubernetes(&args, None);
+        let script = kubernetes(&args, Some(640));
+        assert_eq!((script.matches("memory: 640Mi").count(), bare.contains("memory")), (4, false));
+        let stated = "        resources:\n          requests:\n            memory: 640Mi\n          limits:\n            memory: 640Mi\n";
+        assert_eq!(script.replace(stated, ""), bare);
+        assert!(script.contains("completions: 8") && script.contains("completionMode: Indexed"));
+        let commands = script.lines().filter_map(|line| line.trim().strip_prefix("command: "));
+        for command in commands {
+            let words: Vec<String> = serde_json::from_str(command).expect("a list of strings");
+            assert_eq!(&words[..2], ["sh", "-c"]);
+        }
+    }
+}

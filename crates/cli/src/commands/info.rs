@@ -1,0 +1,95 @@
+//! `glimt info`: how a picture was made.
+
+use std::path::Path;
+
+use serde_json::{Map, Value, json};
+
+use crate::args::InfoArgs;
+use crate::console::Console;
+use crate::exit::Exit;
+use crate::output::json::file;
+use crate::output::settings::{Made, made};
+use crate::scene::other_content;
+use crate::scene::sanitize::visible;
+
+pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
+    let made = match made(&args.image) {
+        Ok(made) => made,
+        Err(error) => return console.fail(Exit::WRONG, &error.to_string()),
+    };
+    if args.json {
+        match file(&as_json(&args.image, &made)) {
+            Ok(text) => console.text(&text),
+            Err(error) => return console.fail(Exit::FAILED, &error.to_string()),
+        }
+    } else {
+        console.text(&as_text(&args.image, &made));
+    }
+    if made.is_own() { Exit::DONE } else { Exit::FAILED }
+}
+
+/// Refuses a file in place of a scene that is an image, a part or a checkpoint, and says how it was made. `None` for other files.
+pub(crate) fn instead_of_scene(path: &Path, console: &Console) -> Option<Exit> {
+    let problem = other_content(path)?;
+    console.diagnostics(&[*problem]);
+    if let Ok(made) = made(path) {
+        console.say_lines(&as_text(path, &made));
+    }
+    Some(Exit::WRONG)
+}
+
+fn as_json(path: &Path, made: &Made) -> Value {
+    let settings: Map<String, Value> =
+        made.settings.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect();
+    json!({
+        "path": path.to_string_lossy(),
+        "format": made.format,
+        "width": made.size.map(|(width, _)| width),
+        "height": made.size.map(|(_, height)| height),
+        "frames": made.frames,
+        "program": made.program,
+        "is_by_glimt": made.is_own(),
+        "settings": settings,
+        "channels": made.channels,
+    })
+}
+
+/// Most columns of the names of settings; longer names move their values to the right.
+const MOST_WIDTH: usize = 40;
+
+/// A line about the file, then one for each setting.
+fn as_text(path: &Path, made: &Made) -> String {
+    let name = path.to_string_lossy();
+    let size = made.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
+    let frames = made.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
+    let mut text = format!("{}: {}{size}{frames}\n", visible(&name), made.format);
+    let program = made.program.as_deref().unwrap_or("unknown: the file does not tell");
+    let mut lines = vec![("program", program)];
+    lines.extend(made.settings.iter().map(|(name, value)| (name.as_str(), value.as_str())));
+    let channels = made.channels.join(" ");
+    if !channels.is_empty() {
+        lines.push(("channels", &channels));
+    }
+    // A name may be as long as its file; formats take no widths above 65,535.
+    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MOST_WIDTH);
+    for (name, value) in lines {
+        text += &format!("  {:width$}  {}\n", visible(name), visible(value));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_with_an_endless_name_is_shown() {
+        for length in [39, 41, 65_535, 65_536, 200_000] {
+            let name = "n".repeat(length);
+            let made = Made { settings: vec![(name.clone(), "value".to_owned())], ..Made::default() };
+            let text = as_text(Path::new("a.png"), &made);
+            assert!(text.contains(&format!("{name}  value\n")) || length < 40, "{length}");
+            assert!(text.contains("value"), "{length}");
+        }
+    }
+}

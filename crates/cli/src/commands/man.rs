@@ -1,0 +1,84 @@
+//! `glimt man`: the manual page of the program or of a command, as roff.
+
+use clap::CommandFactory;
+use clap_mangen::Man;
+use clap_mangen::roff::{Roff, bold, roman};
+
+use crate::args::{Args, EXAMPLES, EXIT_CODES};
+use crate::console::Console;
+use crate::environment::VARIABLES;
+use crate::exit::Exit;
+use crate::scene::nearest::nearest;
+
+/// Prints the page of a command, or of the program.
+pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
+    let mut all = Args::command();
+    all.build();
+    let found = match command {
+        None => Some(&all),
+        Some(name) => all.find_subcommand(name),
+    };
+    let Some(found) = found else {
+        let name = command.unwrap_or_default();
+        let names: Vec<&str> = all.get_subcommands().map(clap::Command::get_name).collect();
+        let help = match nearest(name, names.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("there are {}", names.join(", ")),
+        };
+        return console.fail(Exit::WRONG, &format!("there is no command {name:?}: {help}"));
+    };
+    match page(found, command.is_none()) {
+        Ok(text) => {
+            console.text(&text);
+            Exit::DONE
+        }
+        Err(error) => console.fail(Exit::FAILED, &format!("cannot make the page: {error}")),
+    }
+}
+
+/// The page; that of the program has the sections that hold for all commands.
+fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
+    let name = command.get_display_name().unwrap_or("glimt").to_owned();
+    let notes = command.get_after_help().map(ToString::to_string);
+    let usage = command.clone().render_usage().to_string();
+    let man = Man::new(command.clone().display_name(name).version(env!("CARGO_PKG_VERSION")));
+    let mut bytes = Vec::new();
+    man.render_title(&mut bytes)?;
+    man.render_name_section(&mut bytes)?;
+    // Every option in a row would be half a page.
+    section("SYNOPSIS", usage.trim_start_matches("Usage:").trim()).to_writer(&mut bytes)?;
+    man.render_description_section(&mut bytes)?;
+    man.render_options_section(&mut bytes)?;
+    if is_whole {
+        man.render_subcommands_section(&mut bytes)?;
+        section("EXAMPLES", EXAMPLES).to_writer(&mut bytes)?;
+        section("EXIT STATUS", EXIT_CODES).to_writer(&mut bytes)?;
+        environment().to_writer(&mut bytes)?;
+    } else if let Some(notes) = notes {
+        section("NOTES", &notes).to_writer(&mut bytes)?;
+    }
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// A section whose lines stay as they are.
+fn section(heading: &str, lines: &str) -> Roff {
+    let mut roff = Roff::default();
+    roff.control("SH", [heading]);
+    roff.control("nf", []);
+    for line in lines.lines() {
+        roff.text([roman(line)]);
+    }
+    roff.control("fi", []);
+    roff
+}
+
+fn environment() -> Roff {
+    let mut roff = Roff::default();
+    roff.control("SH", ["ENVIRONMENT"]);
+    for (names, effect) in VARIABLES {
+        roff.control("TP", []);
+        roff.text([bold(names)]);
+        roff.text([roman(effect.replace('`', ""))]);
+    }
+    roff
+}

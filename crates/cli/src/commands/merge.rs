@@ -1,0 +1,418 @@
+//! `glimt merge`: parts to a picture.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant, SystemTime};
+
+use indicatif::ProgressBar;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde_json::json;
+
+use crate::args::{MergeArgs, Progress};
+use crate::console::{Console, answer_columns};
+use crate::control::CancelToken;
+use crate::exit::Exit;
+use crate::film::Film;
+use crate::film::tone::develop;
+use crate::merge_block::Block;
+use crate::output::part::{self, Merged, PartError, PartFile};
+use crate::output::write::{Guard, atomic_until};
+use crate::output::{self, Finish, Format, Losses, OutputError, is_one_file, scene_path};
+use crate::progress::{json_line, style};
+use crate::scene::sanitize::{shortened, visible};
+use crate::signals::{self, Ended};
+use crate::system::threads::start_failure;
+use crate::tui::{Named, printed};
+
+/// Between two looks for parts that arrive.
+const PAUSE: Duration = Duration::from_millis(500);
+
+pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
+    let pool = match ThreadPoolBuilder::new().build() {
+        Ok(pool) => pool,
+        Err(error) => return console.fail(Exit::FAILED, &start_failure("threads", false, &error)),
+    };
+    let token = CancelToken::new();
+    let cancel = token.clone();
+    let ended = match signals::catch(move || cancel.cancel()) {
+        Ok(ended) => ended,
+        Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
+    };
+    let exit = Merge { args, console, token: &token, pool: &pool }.run();
+    ended.by().map_or(exit, |number| say_end(&ended, number, console))
+}
+
+fn say_end(_ended: &Ended, number: i32, console: &Console) -> Exit {
+    if let Some(signal) = signals::name(number) {
+        console.say(&format!("ended by {signal}: nothing was written"));
+    }
+    Exit::signal(number)
+}
+
+/// One call.
+struct Merge<'a> {
+    args: &'a MergeArgs,
+    console: &'a Console,
+    token: &'a CancelToken,
+    pool: &'a ThreadPool,
+}
+
+impl Merge<'_> {
+    fn run(&self) -> Exit {
+        self.try_run().unwrap_or_else(|exit| exit)
+    }
+
+    fn try_run(&self) -> Result<Exit, Exit> {
+        let format = self.check_output()?;
+        let parts = if self.args.watch { self.watched()? } else { self.opened()? };
+        self.check_inputs(&parts)?;
+        let merged = self.merged(&parts, self.args.partial, "merge")?;
+        let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
+            return Err(self.console.fail(Exit::WRONG, "the parts do not say how their picture is finished"));
+        };
+        self.write(format, finish, &merged, &parts)?;
+        self.say_missing(&merged);
+        Ok(Exit::DONE)
+    }
+
+    /// Checks before the work that the output can be written, and is none of the parts.
+    fn check_output(&self) -> Result<Format, Exit> {
+        let out = &self.args.out;
+        let name = out.display();
+        if part::is_part(out) {
+            let message =
+                format!("cannot write {name}: it is a part; name the picture first, then the parts");
+            return Err(self.console.fail(Exit::WRONG, &message));
+        }
+        if self.args.parts.iter().any(|part| is_one_file(part, out)) {
+            let message =
+                format!("{name} is the picture to write, and is given again as a part: name it once");
+            return Err(self.console.fail(Exit::WRONG, &message));
+        }
+        let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
+        output::check_target(out).map_err(|error| self.console.fail(Exit::FAILED, &error.to_string()))?;
+        Ok(format)
+    }
+
+    /// Checks before the work that the picture does not take the place of a file that it was made of.
+    fn check_inputs(&self, parts: &[PartFile]) -> Result<(), Exit> {
+        match self.refused_input(parts, &self.args.out) {
+            Some(message) => Err(self.console.fail(Exit::WRONG, &message)),
+            None => Ok(()),
+        }
+    }
+
+    /// Why the picture must not be written to a file: the parts were made of it. `None` if they were not.
+    fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
+        let by_content = || part::input_in_place_of(parts, path).map(|name| (name, "it"));
+        let by_name = || part::input_of_that_name(parts, path).map(|name| (name, "a file of that name"));
+        let (name, what) = by_content().or_else(by_name)?;
+        let out = self.args.out.display();
+        Some(format!(
+            "cannot write {out}: the parts were rendered from {what} ({name}); choose another name for the picture"
+        ))
+    }
+
+    /// Opens all parts; every one that is wrong is named.
+    fn opened(&self) -> Result<Vec<PartFile>, Exit> {
+        let mut bar = Bar::new(self.args.progress, self.console, "read");
+        let (mut parts, mut wrong) = (Vec::new(), Vec::new());
+        for (index, path) in self.args.parts.iter().enumerate() {
+            match PartFile::open(path, self.token) {
+                Ok(part) => parts.push(part),
+                Err(error) if error.is_out_of_files() => {
+                    bar.end();
+                    return Err(self.too_many_files(parts.len()));
+                }
+                Err(PartError::Unreadable { source, .. })
+                    if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
+                Err(PartError::Cancelled(_)) => return Err(Exit::FAILED),
+                Err(error) => wrong.push(error),
+            }
+            bar.at(index + 1, self.args.parts.len());
+        }
+        bar.end();
+        wrong.iter().for_each(|error| self.console.say(&format!("error: {error}")));
+        match (wrong.is_empty(), parts.is_empty()) {
+            (false, _) => Err(Exit::WRONG),
+            (true, true) => Err(self.console.fail(Exit::WRONG, "none of the parts is there")),
+            (true, false) => Ok(parts),
+        }
+    }
+
+    /// Every further part would fail for the same reason.
+    fn too_many_files(&self, opened: usize) -> Exit {
+        let all = self.args.parts.len();
+        let message = format!(
+            "too many open files: {opened} of {all} parts could be opened; raise the limit on open files (ulimit -n)"
+        );
+        self.console.fail(Exit::FAILED, &message)
+    }
+
+    /// Waits until all parts are there and whole, and shows what is there.
+    fn watched(&self) -> Result<Vec<PartFile>, Exit> {
+        let mut parts: Vec<PartFile> = Vec::new();
+        let mut waiting: Vec<Awaited> = self.args.parts.iter().cloned().map(Awaited::new).collect();
+        let mut said = None;
+        let mut block = Block::default();
+        loop {
+            let mut rest = Vec::new();
+            for mut awaited in waiting {
+                let looked = awaited.look(self.token).map_err(|error| match error.is_out_of_files() {
+                    true => self.too_many_files(parts.len()),
+                    false => self.refuse(&error),
+                });
+                match looked? {
+                    Some(part) => parts.push(part),
+                    None => rest.push(awaited),
+                }
+            }
+            waiting = rest;
+            let unfinished: Vec<&Path> = waiting.iter().filter_map(Awaited::unfinished).collect();
+            let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
+            if said.as_ref() != Some(&state) {
+                let is_new = said.is_none_or(|(count, _)| count != parts.len());
+                let words = self.parts_words(parts.len(), &unfinished);
+                if self.has_block() {
+                    self.redraw(&parts, &words, &mut block)?;
+                } else if is_new {
+                    // Name parts that do not fit as soon as they appear.
+                    part::check(&parts).map_err(|error| self.refuse(&error))?;
+                }
+                self.say_parts(parts.len(), &unfinished, &words);
+                said = Some(state);
+            }
+            if waiting.is_empty() {
+                return Ok(parts);
+            }
+            self.pause()?;
+        }
+    }
+
+    fn pause(&self) -> Result<(), Exit> {
+        let end = Instant::now() + PAUSE;
+        while Instant::now() < end {
+            if self.token.is_cancelled() {
+                return Err(Exit::FAILED);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        Ok(())
+    }
+
+    /// The number of parts that exist, and the names of the unfinished ones.
+    fn parts_words(&self, count: usize, unfinished: &[&Path]) -> String {
+        let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
+        let not_whole = match names.as_slice() {
+            [] => String::new(),
+            [name] => format!("; {name} is not whole yet"),
+            names => format!("; {} are not whole yet", names.join(", ")),
+        };
+        format!("{count} of {} parts{not_whole}", self.args.parts.len())
+    }
+
+    /// Reports the parts on stderr, unless the image on the same terminal has these words.
+    fn say_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
+        match self.args.progress {
+            Progress::None => {}
+            Progress::Json => {
+                let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
+                let total = self.args.parts.len();
+                json_line(&json!({ "event": "parts", "parts": count, "total": total, "unfinished": names }));
+            }
+            Progress::Auto if self.has_block() && self.console.is_terminal => {}
+            Progress::Auto | Progress::Plain => self.console.say(words),
+        }
+    }
+
+    /// Whether the image is redrawn in place: on a terminal, if no lines of progress come in between.
+    fn has_block(&self) -> bool {
+        let has_lines = match self.args.progress {
+            Progress::Plain | Progress::Json => self.console.is_terminal,
+            Progress::Auto | Progress::None => false,
+        };
+        std::io::stdout().is_terminal() && !has_lines
+    }
+
+    /// Shows the image of these parts in place of the last one, with words above it.
+    fn redraw(&self, parts: &[PartFile], words: &str, block: &mut Block) -> Result<(), Exit> {
+        let words = visible(words);
+        let columns = answer_columns();
+        let finish = parts.first().and_then(|part| part.head.picture.finish());
+        let lines = match finish {
+            None => {
+                part::check(parts).map_err(|error| self.refuse(&error))?;
+                String::new()
+            }
+            Some(finish) => {
+                let merged = self.merged(parts, true, "show")?;
+                self.pool.install(|| {
+                    let image = finish.image(&merged.film);
+                    let picture = develop(&image, &finish.tone.resolved_for(&image));
+                    printed(&[Named { name: words.to_string(), picture }], self.args.color, true)
+                })
+            }
+        };
+        // A narrow terminal shows no image.
+        let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
+        self.console.text(&block.redrawn(&lines, columns));
+        Ok(())
+    }
+
+    fn merged(&self, parts: &[PartFile], is_partial: bool, what: &'static str) -> Result<Merged, Exit> {
+        let mut bar = Bar::new(self.args.progress, self.console, what);
+        let tell = |tile: usize, film: &Film| bar.at(tile, film.tile_count());
+        let merged = part::merge(parts, is_partial, self.token, tell);
+        bar.end();
+        merged.map_err(|error| self.refuse(&error))
+    }
+
+    fn refuse(&self, error: &PartError) -> Exit {
+        match error {
+            PartError::Cancelled(_) => Exit::FAILED,
+            PartError::Film(_) => self.console.fail(Exit::FAILED, &error.to_string()),
+            PartError::Unreadable { .. }
+            | PartError::Foreign { .. }
+            | PartError::Version { .. }
+            | PartError::Unfinished { .. }
+            | PartError::Damaged { .. }
+            | PartError::Kind { .. }
+            | PartError::Other { .. }
+            | PartError::Doubled { .. }
+            | PartError::Missing { .. } => self.console.fail(Exit::WRONG, &error.to_string()),
+        }
+    }
+
+    fn write(
+        &self,
+        format: Format,
+        mut finish: Finish,
+        merged: &Merged,
+        parts: &[PartFile],
+    ) -> Result<(), Exit> {
+        let (out, token) = (&self.args.out, self.token);
+        name_scene(&mut finish, out);
+        let film = &merged.film;
+        let may_replace = |real: &Path| {
+            let is_given = self.args.parts.iter().any(|part| is_one_file(part, real));
+            let is_part = is_given || part::is_part(real);
+            let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
+            let why = why.or_else(|| self.refused_input(parts, real));
+            why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
+        };
+        let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_one_file(part, path));
+        let tell = |what: String| self.console.say(&format!("warning: {what}"));
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Told(&tell) };
+        let bytes = self.pool.install(|| finish.encode(film, (&finish.image(film), &[]), format, token));
+        let written = bytes.and_then(|bytes| atomic_until(out, &bytes, &guard, token));
+        written.map_err(|error| match error {
+            OutputError::Cancelled(_) => Exit::FAILED,
+            other => self.console.fail(Exit::FAILED, &other.to_string()),
+        })?;
+        if self.args.progress != Progress::None {
+            let (width, height) = (film.width(), film.height());
+            self.console.say(&format!("wrote {} ({width}×{height})", out.display()));
+        }
+        Ok(())
+    }
+
+    fn say_missing(&self, merged: &Merged) {
+        if !merged.missing.is_empty() {
+            let missing = part::missing_parts(&merged.missing, merged.count);
+            self.console.say(&format!("warning: {missing}; the picture is made of the others"));
+        }
+    }
+}
+
+/// Records the scene's path as a render in that folder does. Parts hold only its file name, because they come from many folders.
+fn name_scene(finish: &mut Finish, out: &Path) {
+    let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
+    let beside = out.with_file_name(scene.as_str());
+    if !scene.contains('/') && beside.is_file() {
+        *scene = scene_path::relative(&beside, out);
+    }
+}
+
+/// A part that is waited for.
+struct Awaited {
+    path: PathBuf,
+    /// Length and time of the file when it was found to end too early. `None` if it was not there yet.
+    unfinished: Option<(u64, Option<SystemTime>)>,
+}
+
+impl Awaited {
+    fn new(path: PathBuf) -> Self {
+        Self { path, unfinished: None }
+    }
+
+    /// Opens the part. `None` if it is not there, or not whole yet.
+    ///
+    /// # Errors
+    /// Those of opening it.
+    fn look(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
+        let now = std::fs::metadata(&self.path).ok().map(|found| (found.len(), found.modified().ok()));
+        // One that has not grown is not read again.
+        if now.is_none() || now == self.unfinished {
+            self.unfinished = now;
+            return Ok(None);
+        }
+        match PartFile::open(&self.path, token) {
+            Ok(part) => Ok(Some(part)),
+            Err(PartError::Unfinished { .. }) => {
+                self.unfinished = now;
+                Ok(None)
+            }
+            Err(PartError::Unreadable { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
+                self.unfinished = None;
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Its name, if it is there and not whole.
+    fn unfinished(&self) -> Option<&Path> {
+        self.unfinished.is_some().then_some(&self.path)
+    }
+}
+
+/// Progress of one step of the work.
+struct Bar {
+    what: &'static str,
+    bar: Option<ProgressBar>,
+    is_json: bool,
+    said: usize,
+}
+
+impl Bar {
+    fn new(progress: Progress, console: &Console, what: &'static str) -> Self {
+        let template = "  {wide_bar} {percent:>3}% {msg}";
+        let has_bar = progress == Progress::Auto && console.is_terminal;
+        let bar = has_bar.then(|| ProgressBar::new(1).with_style(style(template)).with_message(what));
+        Self { what, bar, is_json: progress == Progress::Json, said: 0 }
+    }
+
+    fn at(&mut self, done: usize, total: usize) {
+        /// Most steps to report.
+        const STEPS: usize = 100;
+        let step = done * STEPS / total.max(1);
+        if step == self.said {
+            return;
+        }
+        self.said = step;
+        if let Some(bar) = &self.bar {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        }
+        if self.is_json {
+            let fraction = done as f64 / total.max(1) as f64;
+            json_line(&json!({ "event": "progress", "stage": self.what, "fraction": fraction }));
+        }
+    }
+
+    fn end(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+    }
+}

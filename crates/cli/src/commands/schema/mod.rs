@@ -1,0 +1,234 @@
+//! The JSON Schema of a scene file, made from the definition of its keys.
+//!
+//! Draft 4 is for editors by Taplo, which knows no later conditions; there a material or light may have the keys of all types, and
+//! a dependency ties each key to its types. In draft 2020-12 each type has a schema of its own.
+
+mod value;
+
+use serde_json::{Map, Value, json};
+
+use self::value::{value, written_color};
+use crate::args::Draft;
+use crate::console::Console;
+use crate::exit::Exit;
+use crate::scene::keys::key::{Default, Form, KeyInfo, TableInfo, TypeInfo};
+use crate::scene::keys::tables;
+
+/// The name of the schema beside scenes.
+pub const FILE: &str = "glimt.schema.json";
+
+/// The line that begins a scene and leads an editor to the schema beside it.
+pub const LINE: &str = "#:schema glimt.schema.json\n";
+
+/// Prints the schema.
+pub(crate) fn run(draft: Draft, console: &Console) -> Exit {
+    console.text(&text(draft));
+    Exit::DONE
+}
+
+/// The schema as a file has it.
+pub fn text(draft: Draft) -> String {
+    format!("{:#}\n", schema(draft))
+}
+
+/// The schema.
+pub fn schema(draft: Draft) -> Value {
+    let properties: Map<String, Value> =
+        tables().iter().map(|info| (info.name.to_owned(), in_file(info, draft))).collect();
+    let mut schema = json!({
+        "$schema": draft.uri(),
+        "title": "A scene of glimt",
+        "description": "See `glimt explain KEY`, and `glimt new FILE` for a commented scene.",
+        "type": "object",
+        "properties": properties,
+        "required": ["camera"],
+        "additionalProperties": false,
+    });
+    schema[draft.definitions()] = json!({ "color": written_color() });
+    schema
+}
+
+/// A table as the file holds it: once, by names, or in a list.
+fn in_file(info: &'static TableInfo, draft: Draft) -> Value {
+    let one = table(info, draft);
+    let mut all = match info.form {
+        Form::Single => one,
+        Form::Named => json!({ "type": "object", "additionalProperties": one }),
+        Form::List => json!({ "type": "array", "items": one }),
+    };
+    all["description"] = info.doc.into();
+    all
+}
+
+fn table(info: &'static TableInfo, draft: Draft) -> Value {
+    let mut table = match (info.types.is_empty(), draft) {
+        (true, _) => object(&info.keys.iter().collect::<Vec<_>>(), draft, |key| described(key, draft)),
+        (false, Draft::Four) => of_all_types(info),
+        (false, Draft::Latest) => by_type(info),
+    };
+    for (name, condition) in conditions(info.name, draft) {
+        table[name] = condition;
+    }
+    table
+}
+
+/// An object with these keys and no others.
+fn object(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
+    let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
+    let is_required = |key: &&&KeyInfo| matches!(key.default, Default::Required(_)) && !is_conditional(key);
+    let required: Vec<&str> = keys.iter().filter(is_required).map(|key| key.name).collect();
+    let mut object = json!({ "type": "object", "properties": properties, "additionalProperties": false });
+    // Draft 4 has no empty list of them.
+    if !required.is_empty() || draft == Draft::Latest {
+        object["required"] = required.into();
+    }
+    object
+}
+
+/// Whether another key may stand in its place.
+fn is_conditional(key: &KeyInfo) -> bool {
+    matches!(key.name, "position" | "look_at")
+}
+
+/// A key's values, with its description and default.
+fn described(key: &KeyInfo, draft: Draft) -> Value {
+    let mut schema = value(key.kind, draft);
+    schema["description"] = description(key).into();
+    if let Default::Is(default) = key.default
+        && let Ok(default) = serde_json::from_str(default)
+    {
+        schema["default"] = default;
+    }
+    schema
+}
+
+/// Description, unit, range and default in words.
+fn description(key: &KeyInfo) -> String {
+    let named =
+        |name: &str, text: String| if text.is_empty() { text } else { format!("\n\n{name}: {text}.") };
+    let default = match key.default {
+        Default::Required(_) => "\n\nRequired.".to_owned(),
+        Default::Is(_) | Default::By(_) => named("Default", key.default_words()),
+        Default::Absent => String::new(),
+    };
+    format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range()))
+}
+
+/// A table whose keys depend on its type, each type by itself.
+fn by_type(info: &'static TableInfo) -> Value {
+    let draft = Draft::Latest;
+    let conditions: Vec<Value> = info
+        .types
+        .iter()
+        .map(|kind| {
+            let mut then =
+                object(&info.keys_of(Some(kind)).collect::<Vec<_>>(), draft, |key| described(key, draft));
+            then["properties"]["type"] = json!(true);
+            for (name, condition) in of_type(kind.name) {
+                then[name] = condition;
+            }
+            json!({ "if": is_of(info, kind), "then": then })
+        })
+        .collect();
+    json!({ "type": "object", "properties": { "type": types(info) }, "allOf": conditions })
+}
+
+/// Whether a table is of a type; the default type needs no `type`.
+fn is_of(info: &TableInfo, kind: &TypeInfo) -> Value {
+    let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
+    let required: &[&str] = if is_default { &[] } else { &["type"] };
+    json!({ "properties": { "type": { "enum": [kind.name] } }, "required": required })
+}
+
+/// The key `type`.
+fn types(info: &TableInfo) -> Value {
+    let names: Vec<&str> = info.types.iter().map(|kind| kind.name).collect();
+    let docs: Vec<String> = info.types.iter().map(|kind| format!("`{}`: {}", kind.name, kind.doc)).collect();
+    json!({ "type": "string", "enum": names, "default": names.first(), "description": docs.join("\n\n") })
+}
+
+/// A table with the keys of all types, where each key depends on a type that has it.
+fn of_all_types(info: &'static TableInfo) -> Value {
+    let draft = Draft::Four;
+    let (mut properties, mut dependencies) = (Map::new(), Map::new());
+    properties.insert("type".to_owned(), types(info));
+    for key in info.keys {
+        properties.insert(key.name.to_owned(), described(key, draft));
+    }
+    let own = || info.types.iter().flat_map(|kind| kind.keys.iter().map(move |key| (kind, key)));
+    for (_, key) in own() {
+        let of_name: Vec<_> = own().filter(|(_, other)| other.name == key.name).collect();
+        properties.insert(key.name.to_owned(), merged(&of_name));
+        if of_name.len() < info.types.len() {
+            dependencies.insert(key.name.to_owned(), dependency(info, &of_name));
+        }
+    }
+    let mut table = json!({ "type": "object", "properties": properties, "additionalProperties": false });
+    table["dependencies"] = dependencies.into();
+    table
+}
+
+/// One schema for a key that several types have: any of their values.
+fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
+    let draft = Draft::Four;
+    let mut values: Vec<Value> = keys.iter().map(|(_, key)| value(key.kind, draft)).collect();
+    values.dedup();
+    let mut schema = match values.as_slice() {
+        [one] => one.clone(),
+        _ => json!({ "anyOf": values }),
+    };
+    let docs: Vec<String> =
+        keys.iter().map(|(kind, key)| format!("`{}`: {}", kind.name, description(key))).collect();
+    schema["description"] = docs.join("\n\n").into();
+    schema
+}
+
+/// The types that a key asks for.
+fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
+    let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
+    let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
+    let mut schema = json!({ "properties": { "type": { "enum": names } } });
+    if !has_default {
+        schema["required"] = json!(["type"]);
+    }
+    schema
+}
+
+/// Conditions between the keys of a table, which no list of keys says.
+fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
+    let none_of = |names: &[&str]| {
+        let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();
+        json!({ "not": { "anyOf": each } })
+    };
+    let dependent = match draft {
+        Draft::Four => "dependencies",
+        Draft::Latest => "dependentSchemas",
+    };
+    match (table, draft) {
+        ("camera", _) => vec![
+            ("anyOf", json!([{ "required": ["orbiter"] }, { "required": ["position", "look_at"] }])),
+            (dependent, json!({ "orbiter": none_of(&["position", "look_at", "up"]) })),
+        ],
+        ("mesh", _) => vec![(dependent, json!({ "matrix": none_of(&["scale", "rotate", "translate"]) }))],
+        ("materials", Draft::Four) => {
+            let is_other =
+                json!({ "not": { "properties": { "type": { "enum": ["metal"] } }, "required": ["type"] } });
+            let mut any = vec![is_other];
+            any.extend(of_type("metal").into_iter().map(|(name, condition)| json!({ name: condition })));
+            vec![("anyOf", any.into())]
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// Conditions between the keys of a type.
+fn of_type(kind: &str) -> Vec<(&'static str, Value)> {
+    match kind {
+        // Exactly one of three groups.
+        "metal" => vec![(
+            "oneOf",
+            json!([{ "required": ["color"] }, { "required": ["eta", "k"] }, { "required": ["element"] }]),
+        )],
+        _ => Vec::new(),
+    }
+}

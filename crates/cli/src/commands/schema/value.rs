@@ -1,0 +1,138 @@
+//! Schemas of values.
+
+use serde_json::{Value, json};
+
+use crate::args::Draft;
+use crate::choice::Choice;
+use crate::math::limits::{LARGEST, SHORTEST};
+use crate::scene::description::Channel;
+use crate::scene::keys::color_names;
+use crate::scene::keys::key::Kind;
+use crate::scene::keys::limits::Limits;
+
+/// The schema of a kind of values.
+pub(super) fn value(kind: Kind, draft: Draft) -> Value {
+    match kind {
+        Kind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
+        Kind::Number(limits) => number(limits, draft),
+        Kind::Flag => json!({ "type": "boolean" }),
+        Kind::Words(list) => {
+            let words = list();
+            let names: Vec<&str> = words.iter().map(|word| word.name).collect();
+            let meanings: Vec<&str> = words.iter().map(|word| word.meaning).collect();
+            let mut schema = json!({ "type": "string", "enum": names });
+            if draft == Draft::Four {
+                schema["x-taplo"] = json!({ "docs": { "enumValues": meanings } });
+            }
+            schema
+        }
+        // Shapes are also known by their numbers.
+        Kind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
+        Kind::File(endings) => file(endings),
+        Kind::Color(limits) => json!({ "anyOf": colors(limits, draft) }),
+        Kind::ColorOrTexture(limits) => any(colors(limits, draft), texture(json!({}))),
+        Kind::Emission(limits) => {
+            let scale = json!({ "anyOf": colors(Limits::AtLeast(0.0), draft) });
+            any(colors(limits, draft), texture(json!({ "scale": scale })))
+        }
+        Kind::NumberOrTexture(limits) => any(vec![number(limits, draft)], channel()),
+        Kind::Numbers(count, _, limits) => numbers(count, limits, draft),
+        Kind::Scale(limits) => json!({ "anyOf": [number(limits, draft), numbers(3, limits, draft)] }),
+        Kind::Texture | Kind::Material => json!({ "type": "string", "minLength": 1 }),
+        Kind::Heights => any(vec![json!({ "type": "string", "minLength": 1 })], channel()),
+    }
+}
+
+fn any(mut values: Vec<Value>, more: Value) -> Value {
+    values.push(more);
+    json!({ "anyOf": values })
+}
+
+fn number(limits: Limits, draft: Draft) -> Value {
+    let between = |least: f64, most: f64| json!({ "type": "number", "minimum": least, "maximum": most });
+    match limits {
+        Limits::Any => between(-LARGEST, LARGEST),
+        Limits::NotZero => {
+            let mut schema = between(-LARGEST, LARGEST);
+            schema["not"] = json!({ "enum": [0] });
+            schema
+        }
+        Limits::AtLeast(least) => between(least, LARGEST),
+        Limits::Length => between(SHORTEST, LARGEST),
+        Limits::LengthOrZero => between(0.0, LARGEST),
+        Limits::Between(least, most) => between(least, most),
+        Limits::Inside(low, high) => match draft {
+            Draft::Four => {
+                let mut schema = between(low, high);
+                schema["exclusiveMinimum"] = true.into();
+                schema["exclusiveMaximum"] = true.into();
+                schema
+            }
+            Draft::Latest => json!({ "type": "number", "exclusiveMinimum": low, "exclusiveMaximum": high }),
+        },
+    }
+}
+
+fn numbers(count: usize, limits: Limits, draft: Draft) -> Value {
+    json!({ "type": "array", "items": number(limits, draft), "minItems": count, "maxItems": count })
+}
+
+/// The forms of a colour.
+fn colors(limits: Limits, draft: Draft) -> Vec<Value> {
+    let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
+    vec![number(limits, draft), numbers(3, limits, draft), written]
+}
+
+/// A colour as a text.
+pub(super) fn written_color() -> Value {
+    let mut names: Vec<&str> = color_names().collect();
+    names.sort_unstable();
+    json!({
+        "description": "An sRGB colour: `#rrggbb`, or the name that CSS has for it, in any case.",
+        "anyOf": [{ "enum": names }, { "type": "string", "pattern": color_pattern(&names) }],
+    })
+}
+
+/// `#rrggbb`, or a name in any case.
+fn color_pattern(names: &[&str]) -> String {
+    let in_any_case =
+        |text: &str| text.chars().map(|c| format!("[{}{c}]", c.to_ascii_uppercase())).collect::<String>();
+    let names: Vec<String> = names.iter().map(|name| in_any_case(name)).collect();
+    format!("^(#[0-9A-Fa-f]{{6}}|{})$", names.join("|"))
+}
+
+/// A path by its ending, in any case.
+fn file(endings: &[&str]) -> Value {
+    let in_any_case = |ending: &&str| {
+        ending
+            .chars()
+            .map(|c| {
+                if c.is_ascii_lowercase() {
+                    format!("[{}{c}]", c.to_ascii_uppercase())
+                } else {
+                    c.to_string()
+                }
+            })
+            .collect::<String>()
+    };
+    let endings: Vec<String> = endings.iter().map(in_any_case).collect();
+    if endings.is_empty() {
+        return json!({ "type": "string", "minLength": 1 });
+    }
+    json!({ "type": "string", "pattern": format!("\\.({})$", endings.join("|")) })
+}
+
+/// `{ texture = "name" }`, with these further keys.
+fn texture(more: Value) -> Value {
+    let mut properties = more;
+    properties["texture"] =
+        json!({ "type": "string", "minLength": 1, "description": "The name of a texture." });
+    json!({ "type": "object", "properties": properties, "required": ["texture"], "additionalProperties": false })
+}
+
+/// `{ texture = "name", channel = "r" }`.
+fn channel() -> Value {
+    let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
+    let doc = "The channel that holds the numbers; without it, luminance, or alpha for opacity.";
+    texture(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
+}

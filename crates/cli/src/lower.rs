@@ -1,0 +1,310 @@
+//! Meaning of the arguments.
+
+use std::path::{Path, PathBuf};
+
+use crate::args::{Progress, RenderArgs};
+use crate::output::Format;
+use crate::output::MovingFormat;
+use crate::output::write::STDOUT;
+use crate::pipeline::settings::Overrides;
+use crate::pipeline::turntable;
+use crate::tui::{ColorChoice, PreviewChoice};
+
+/// Standard output, where it stands for a file.
+pub(super) const STANDARD: &str = "-";
+
+/// Nice value by which the terminal's renders give way to the front end and to all other programs.
+const POLITE: u8 = 10;
+
+/// An order of the call.
+#[derive(Clone, Debug)]
+pub(super) struct Order {
+    pub(super) scene: PathBuf,
+    pub(super) overrides: Overrides,
+    pub(super) is_once: bool,
+    pub(super) progress: Progress,
+    pub(super) preview: PreviewChoice,
+    pub(super) color: ColorChoice,
+    pub(super) poll: bool,
+    pub(super) notify_after: f64,
+    /// Increase of the nice value: with `is_once` that of the program, else that of the render threads.
+    pub(super) nice: u8,
+}
+
+impl Order {
+    /// Whether errors go into JSON lines.
+    pub(super) fn is_in_json(&self) -> bool {
+        self.is_once && self.progress == Progress::Json
+    }
+}
+
+/// The meaning of the arguments.
+///
+/// # Errors
+/// What is wrong with them, in words with the way out.
+pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
+    match args.shard {
+        Some(_) if !args.once => {
+            return Err("--shard needs --once: the terminal shows whole pictures".to_owned());
+        }
+        // A part may have any name.
+        Some(_) => {}
+        None if args.turntable.is_some() => check_turntable(&args)?,
+        None => check_outputs(&args.outputs)?,
+    }
+    if args.turntable.is_some() && args.shard.is_some() {
+        return Err(
+            "--turntable and --shard exclude each other: a turntable is rendered by one machine".to_owned()
+        );
+    }
+    if args.layers.is_some() {
+        let why = match (args.once, args.shard) {
+            (false, _) => "--layers needs --once: the terminal shows one layer at a time, by v",
+            (true, Some(_)) => "--layers and --shard exclude each other: parts hold the picture alone",
+            (true, None) => "",
+        };
+        if !why.is_empty() {
+            return Err(why.to_owned());
+        }
+    }
+    let mut overrides = args.overrides();
+    if overrides.turn.is_some() {
+        // A picture is soon done again; those before it are files.
+        overrides.checkpoints.seconds = 0.0;
+    }
+    if overrides.report.as_deref() == Some(Path::new(STANDARD)) {
+        if !args.once {
+            let why = "which has the picture: name a file, or use --once";
+            return Err(format!("--report {STANDARD} is standard output, {why}"));
+        }
+        overrides.report = Some(STDOUT.into());
+    }
+    let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
+    Ok(Order {
+        scene,
+        overrides,
+        is_once: args.once,
+        progress: args.progress,
+        preview: args.preview,
+        color: args.color,
+        poll: args.poll,
+        notify_after: args.notify_after,
+        nice: args.nice.unwrap_or(if args.once { 0 } else { POLITE }),
+    })
+}
+
+/// Checks that every picture of a turntable has a file, and that the call has no option of a single picture.
+fn check_turntable(args: &RenderArgs) -> Result<(), String> {
+    if !args.once {
+        return Err("--turntable needs --once: the terminal shows one picture".to_owned());
+    }
+    for (is_given, name) in [(args.resume, "--resume"), (args.keep_checkpoint, "--keep-checkpoint")] {
+        if is_given {
+            return Err(format!("{name} is for a single picture: a turntable has no checkpoints"));
+        }
+    }
+    for (index, path) in args.outputs.iter().enumerate() {
+        if MovingFormat::of(path).is_none() {
+            Format::of(path).map_err(|error| format!("{error}, or for a turntable of .gif, .apng"))?;
+        }
+        turntable::check_name(path)?;
+        check_once(&args.outputs, index)?;
+    }
+    if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
+        let name = twin.display();
+        return Err(format!(
+            "{name} would hold two pictures of the turntable: name the files more differently"
+        ));
+    }
+    match &args.report {
+        Some(path) if path != Path::new(STANDARD) && !turntable::has_number(path) => {
+            let name = turntable::suggested(path);
+            Err(format!("a turntable has a report for each picture: --report {}", name.display()))
+        }
+        Some(_) | None => Ok(()),
+    }
+}
+
+/// Refuses a file that was named before.
+fn check_once(outputs: &[PathBuf], index: usize) -> Result<(), String> {
+    let path = &outputs[index];
+    if outputs[..index].contains(path) {
+        return Err(format!("-o {} is given twice", path.display()));
+    }
+    Ok(())
+}
+
+/// Every ending must be known, and no file may be named twice.
+fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
+    for (index, path) in outputs.iter().enumerate() {
+        if MovingFormat::of(path).is_some() {
+            let name = path.display();
+            return Err(format!(
+                "{name} is a moving picture, which --turntable N makes; name a .png for a single one"
+            ));
+        }
+        Format::of(path).map_err(|error| error.to_string())?;
+        check_once(outputs, index)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{CommandFactory, Parser};
+
+    use super::*;
+    use crate::args::{Args, Subcommand};
+    use crate::choice::Choice;
+    use crate::film::Rect;
+    use crate::pipeline::settings::{Checkpoints, Resume, View};
+    use crate::scene::description::{self, KeyRange};
+
+    fn lowered(line: &str) -> Result<Order, String> {
+        let words = std::iter::once("glimt").chain(line.split_whitespace());
+        lower(Args::try_parse_from(words).map_err(|error| error.to_string())?.render)
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn nothing_said_changes_nothing() {
+        let order = lowered("a.toml").expect("right");
+        let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
+        assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
+        let once = lowered("a.toml --once").expect("right").overrides.checkpoints;
+        assert_eq!(once, Checkpoints { resume: Resume::No, ..checkpoints });
+        assert!(!order.is_once && !order.poll);
+    }
+
+    #[test]
+    fn every_option_arrives() {
+        let order = lowered(
+            "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
+             --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
+             --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
+             --nice 3 --notify-after 7 --checkpoint 5 --resume --keep-checkpoint --memory 1.5GiB",
+        )
+        .expect("right");
+        let expected = Overrides {
+            sets: vec!["a.b=1".into(), "a.c=x".into()],
+            outputs: vec!["a.png".into(), "b.exr".into()],
+            report: Some("r.json".into()),
+            replaces_foreign: true,
+            width: Some(3),
+            height: Some(4),
+            samples: Some(5),
+            error: Some(0.02),
+            time_seconds: Some(0.5),
+            max_depth: Some(0),
+            integrator: Some(description::Integrator::Path),
+            shadows: Some(description::Shadows::Hard),
+            clamp: Some(2.5),
+            photons: Some(true),
+            dof: Some(false),
+            accel: Some(description::Accel::Bvh),
+            view: Some(View::Normal),
+            seed: Some(7),
+            crop: Some(Rect { x: 1, y: 2, width: 3, height: 4 }),
+            threads: Some(2),
+            bit_depth: Some(16),
+            memory: Some(3 << 29),
+            checkpoints: Checkpoints { seconds: 5.0, resume: Resume::Asked, are_kept: true },
+            ..Default::default()
+        };
+        assert_eq!(order.overrides, expected);
+        assert!(order.is_once && order.poll);
+        assert_eq!((order.nice, order.notify_after), (3, 7.0));
+        assert_eq!((order.progress, order.color), (Progress::Json, ColorChoice::Indexed256));
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_refused() {
+        for wrong in [
+            "",
+            "a.toml --samples 0",
+            "a.toml --width 65537",
+            "a.toml --time 0",
+            "a.toml --time nan",
+            "a.toml --crop 1,2,3",
+            "a.toml --crop 1,2,3,0",
+            "a.toml --crop 1,2,3,4,x",
+            "a.toml --bit-depth 12",
+            "a.toml --view nothing",
+            "a.toml -o a.xyz",
+            "a.toml -o a.png -o a.png",
+            "a.toml b.toml",
+            "a.toml --threads 5000",
+            "a.toml --integrator paths",
+            "a.toml --clamp -1",
+            "a.toml --clamp nan",
+            "a.toml --accel octree",
+            "a.toml --seed -1",
+            "a.toml --nice 20",
+            "a.toml --nice -1",
+            "a.toml --notify-after -1",
+            "a.toml --checkpoint -1",
+            "a.toml --memory 0",
+            "a.toml --memory 5XB",
+            "a.toml --memory GiB",
+            "a.toml --memory inf",
+            "a.toml --shard 1/2",
+            "a.toml --once -o a.part --shard 0/2",
+            "a.toml --once -o a.part --shard 3/2",
+            "a.toml --once -o a.part --shard 1",
+        ] {
+            assert!(lowered(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// Options accept and refuse the same values as their keys of `[render]`.
+    #[test]
+    fn options_accept_what_the_keys_accept() {
+        let command = Args::command();
+        for key in description::Render::keys() {
+            let name = key.name.replace('_', "-");
+            let option = command.get_arguments().find(|option| option.get_long() == Some(&*name));
+            assert_eq!(option.is_some(), key.has_option, "--{name}");
+            let Some(option) = option else { continue };
+            assert!(option.get_help().is_some(), "--{name} has help");
+            let (accepted, refused) = match key.range {
+                KeyRange::Whole(range) => {
+                    let (least, most) = (i64::from(*range.start()), i64::from(*range.end()));
+                    ([least, most].map(|end| end.to_string()).to_vec(), vec![least - 1, most + 1])
+                }
+                KeyRange::Number(range) => {
+                    let ends = [*range.start() as f32, *range.end() as f32];
+                    (ends.map(|end| end.to_string()).to_vec(), vec![*range.start() as i64 - 1])
+                }
+                KeyRange::Names(names) => (names.into_iter().map(str::to_owned).collect(), Vec::new()),
+                KeyRange::Color => panic!("--{name} is a colour"),
+            };
+            let refused = refused.iter().map(i64::to_string).chain(["another".to_owned()]);
+            for value in accepted {
+                let order = lowered(&format!("a.toml --{name} {value}")).expect(&name);
+                assert_ne!(order.overrides, Overrides::default(), "--{name} {value} arrives");
+            }
+            for value in refused {
+                assert!(lowered(&format!("a.toml --{name} {value}")).is_err(), "--{name} {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_command_is_no_scene_unless_it_has_a_folder() {
+        let parsed = |words: &[&str]| Args::try_parse_from([&["glimt"], words].concat()).expect("right");
+        assert!(matches!(parsed(&["check", "a.toml"]).command, Some(Subcommand::Check { .. })));
+        assert_eq!(parsed(&["./check"]).render.scene, Some("./check".into()));
+    }
+
+    #[test]
+    fn every_view_has_its_name() {
+        for &view in View::ALL {
+            let order = lowered(&format!("a.toml --view {}", view.name())).expect("right");
+            assert_eq!(order.overrides.view, Some(view));
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! One JSON object a line. Its first key, `event`, says which other keys there are:
+//!
+//! | event | keys |
+//! | --- | --- |
+//! | `stage` | `stage`, `status` (`running`, `done`, `reused`, `skipped`), `seconds`, `why` |
+//! | `asset` | `name`, `fraction` |
+//! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
+//! | `written` | `path`, `bytes` |
+//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `set_aside`), `path`, `message`, `samples`, or null |
+//! | `write_failed` | `message`: the report, or one of several pictures, could not be written |
+//! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
+//! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
+//! | `cancelled` | |
+//!
+//! A diagnostic has the keys of `check --json` ([`diagnostic_json`](crate::diagnostic_json)), and `path`.
+
+use std::borrow::Cow;
+use std::io::Write;
+
+use serde_json::{Value, json};
+
+use super::Reporter;
+use crate::diagnostic_json::diagnostic;
+use crate::output::json::in_a_line;
+use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
+use crate::scene::diagnostic::Diagnostic;
+use crate::scene::report::Locator;
+
+pub(super) struct Json;
+
+impl Reporter for Json {
+    fn event(&mut self, event: &Event) {
+        if let Some(value) = value(event) {
+            line(&value);
+        }
+    }
+
+    fn says_results(&self) -> bool {
+        false
+    }
+
+    fn says_diagnostics(&self) -> bool {
+        true
+    }
+}
+
+/// A line on stderr; nothing can be done where nobody reads it.
+pub(crate) fn line(value: &Value) {
+    if let Ok(text) = with_event_first(value) {
+        let _ = writeln!(std::io::stderr().lock(), "{text}");
+    }
+}
+
+/// The object in a line. Its other keys are sorted.
+fn with_event_first(value: &Value) -> serde_json::Result<String> {
+    let mut rest = value.clone();
+    let Some(event) = rest.as_object_mut().and_then(|keys| keys.remove("event")) else {
+        return in_a_line(value);
+    };
+    let (first, rest) = (in_a_line(&json!({ "event": event }))?, in_a_line(&rest)?);
+    let comma = if rest == "{}" { "" } else { "," };
+    Ok(format!("{}{comma}{}", &first[..first.len() - 1], &rest[1..]))
+}
+
+fn value(event: &Event) -> Option<Value> {
+    Some(match event {
+        Event::Stage { stage, .. } => json!({
+            "event": "stage", "stage": stage.name, "status": stage.status, "seconds": stage.seconds,
+            "why": stage.why,
+        }),
+        Event::Asset { progress, .. } => json!({
+            "event": "asset", "name": progress.name,
+            "fraction": progress.done as f64 / progress.total.max(1) as f64,
+        }),
+        Event::Progress { progress, .. } => json!({
+            "event": "progress", "stage": "render", "fraction": progress.fraction,
+            "elapsed_seconds": progress.elapsed_seconds, "eta_seconds": progress.eta_seconds,
+            "samples": progress.samples, "total_samples": progress.total_samples,
+            "noise": progress.noise.map(|noise| json!({
+                "now": noise.now,
+                "next": noise.next.map(|(level, seconds)| json!({ "level": level, "seconds": seconds })),
+            })),
+        }),
+        Event::Written { path, bytes, .. } => {
+            json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes })
+        }
+        Event::Done { report, warnings, unchanged, .. } => json!({
+            "event": "done", "unchanged": unchanged, "seconds": report.seconds,
+            "complete": report.image.complete, "diagnostics": diagnostics(warnings),
+        }),
+        Event::Checkpoint { news, .. } => checkpoint(news),
+        Event::WriteFailed { message, .. } => json!({ "event": "write_failed", "message": message }),
+        Event::Failed { failure, .. } => failed(failure),
+        Event::Cancelled { .. } => json!({ "event": "cancelled" }),
+        Event::Started { .. }
+        | Event::Files { .. }
+        | Event::Warnings { .. }
+        | Event::Settings { .. }
+        | Event::Preview { .. }
+        // Among the diagnostics at the end.
+        | Event::NotKept { .. }
+        | Event::Refused { .. }
+        | Event::OwnImage { .. }
+        | Event::WritePostponed { .. }
+        | Event::WriteDone { .. }
+        | Event::LastGoodEnded { .. }
+        | Event::Text { .. }
+        | Event::CameraKept { .. }
+        | Event::CameraUndone { .. }
+        | Event::Picked { .. } => return None,
+    })
+}
+
+fn checkpoint(news: &CheckpointNews) -> Value {
+    let (status, path, message, samples) = match news {
+        CheckpointNews::Written { path } => ("written", Some(path), None, None),
+        CheckpointNews::Failed { message } => ("failed", None, Some(message), None),
+        CheckpointNews::Resumed { path, samples } => ("resumed", Some(path), None, Some(samples)),
+        CheckpointNews::Absent { path } => ("absent", Some(path), None, None),
+        CheckpointNews::Ignored { path } => ("ignored", Some(path), None, None),
+        CheckpointNews::Unused { path, why } => ("unused", Some(path), Some(why), None),
+        CheckpointNews::Finished { path } => ("finished", Some(path), None, None),
+        CheckpointNews::SetAside { path } => ("set_aside", Some(path), None, None),
+    };
+    let path = path.map(|path| path.to_string_lossy());
+    json!({ "event": "checkpoint", "status": status, "path": path, "message": message, "samples": samples })
+}
+
+fn failed(failure: &Failure) -> Value {
+    match failure {
+        Failure::Work(message) => {
+            json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })
+        }
+        Failure::Scene(all) => json!({
+            "event": "failed", "kind": "scene", "message": "the scene or the call is wrong", "diagnostics": diagnostics(all),
+        }),
+    }
+}
+
+/// Diagnostics as in `check --json`; `path` is `file`, or null without one.
+fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
+    let mut places = Locator::default();
+    let with_path = |one: &Diagnostic| {
+        let mut value = diagnostic(one, &mut places);
+        value["path"] = json!(path(one));
+        value
+    };
+    all.iter().map(with_path).collect()
+}
+
+fn path(diagnostic: &Diagnostic) -> Option<Cow<'_, str>> {
+    Some(diagnostic.path.to_string_lossy()).filter(|path| !path.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_event_comes_first() {
+        let value = json!({ "a": 1, "event": "stage", "z": [2] });
+        assert_eq!(with_event_first(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
+        assert_eq!(
+            with_event_first(&json!({ "event": "cancelled" })).expect("JSON"),
+            r#"{"event":"cancelled"}"#
+        );
+        assert_eq!(with_event_first(&json!({ "a": 1 })).expect("JSON"), r#"{"a":1}"#);
+    }
+
+    #[test]
+    fn a_diagnostic_has_the_keys_of_check_and_its_own() {
+        let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
+        let outcome = crate::scene::parse(text.into(), std::path::Path::new("a.toml"));
+        let failed = failed(&Failure::Scene(outcome.diagnostics));
+        let one = &failed["diagnostics"][0];
+        assert_eq!(one["path"], one["file"]);
+        for key in ["severity", "message", "line", "column", "end_line", "end_column", "label"] {
+            assert!(!one[key].is_null(), "{key}: {one}");
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Lines now and then, for logs.
+
+use std::collections::HashSet;
+use std::time::{Duration, Instant};
+
+use super::{Reporter, samples, seconds};
+use crate::console::Console;
+use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
+use crate::pipeline::words::Eta;
+
+/// Longest silence of a render.
+const INTERVAL: Duration = Duration::from_secs(5);
+/// Lines of a whole render, beside those after a long silence.
+const STEPS: f64 = 10.0;
+
+pub(super) struct Plain {
+    console: Console,
+    /// Steps of the render that were reported.
+    said: f64,
+    last: Instant,
+    last_line: String,
+    /// Names of the assets that were reported as loaded.
+    loaded: HashSet<String>,
+}
+
+impl Plain {
+    pub(super) fn new(console: Console) -> Self {
+        Self { console, said: 0.0, last: Instant::now(), last_line: String::new(), loaded: HashSet::new() }
+    }
+
+    /// Whether an asset is loaded, for the first time: a file of several meshes is loaded once for each of them.
+    fn is_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
+        progress.done == progress.total && self.loaded.insert(progress.name.clone())
+    }
+
+    fn progress(&mut self, progress: &RenderProgress) {
+        if let Some(line) = self.due(progress) {
+            self.console.say(&line);
+        }
+    }
+
+    /// The line to say now, never one twice.
+    fn due(&mut self, progress: &RenderProgress) -> Option<String> {
+        let step = (progress.fraction * STEPS).floor();
+        if progress.fraction >= 1.0 || (step <= self.said && self.last.elapsed() < INTERVAL) {
+            return None;
+        }
+        (self.said, self.last) = (step, Instant::now());
+        let line = line(progress);
+        if line == self.last_line {
+            return None;
+        }
+        self.last_line.clone_from(&line);
+        Some(line)
+    }
+}
+
+impl Reporter for Plain {
+    fn event(&mut self, event: &Event) {
+        if let Event::Stage { stage, .. } = event
+            && stage.status != Status::Running
+        {
+            self.console.say(&stage_line(stage));
+        } else if let Event::Asset { progress, .. } = event
+            && self.is_newly_loaded(progress)
+        {
+            self.console.say(&format!("{:<8} {} 100%", "loaded", progress.name));
+        } else if let Event::Progress { progress, .. } = event {
+            self.progress(progress);
+        }
+    }
+}
+
+fn line(progress: &RenderProgress) -> String {
+    let eta = Eta::of(progress).map_or(String::new(), |eta| format!(", {} left", eta.words()));
+    format!("{:<8} {:3.0}% ({}{eta})", "render", (progress.fraction * 100.0).floor(), samples(progress))
+}
+
+/// `parse    done    0.40 ms`
+pub(super) fn stage_line(stage: &StageReport) -> String {
+    let status = match stage.status {
+        Status::Running => "running",
+        Status::Done => "done",
+        Status::Reused => "reused",
+        Status::Skipped => "skipped",
+    };
+    let time = if stage.status == Status::Skipped { String::new() } else { seconds(stage.seconds) };
+    format!("{:<8} {status:<7} {time:>9}  {}", stage.name.name(), stage.why).trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_line_is_said_twice() {
+        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
+        let progress = |fraction, samples| RenderProgress {
+            fraction,
+            elapsed_seconds: 1.0,
+            earlier_seconds: 0.0,
+            eta_seconds: None,
+            samples,
+            mean_samples: f64::from(samples),
+            total_samples: 100,
+            is_total_fixed: true,
+            noise: None,
+        };
+        let mut said = Vec::new();
+        for samples in 0..100 {
+            // Each comes twice, as a pass ends and as the next begins.
+            said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
+            said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
+        }
+        let tens: Vec<_> = (1..10).map(|ten| line(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
+        assert_eq!(said, tens);
+        // After a long silence, and nothing new.
+        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
+        assert_eq!(plain.due(&progress(0.9, 90)), None);
+        plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
+        assert!(plain.due(&progress(0.91, 91)).is_some());
+    }
+
+    #[test]
+    fn a_file_of_several_meshes_is_loaded_once() {
+        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
+        let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
+        let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
+        assert_eq!(said.map(|progress| plain.is_newly_loaded(&progress)), [false, true, false, true]);
+    }
+
+    #[test]
+    fn a_line_says_how_far_and_how_long() {
+        let progress = RenderProgress {
+            fraction: 0.4,
+            elapsed_seconds: 1.0,
+            earlier_seconds: 0.0,
+            eta_seconds: Some(1.5),
+            samples: 25,
+            mean_samples: 25.62,
+            total_samples: 64,
+            is_total_fixed: true,
+            noise: None,
+        };
+        assert_eq!(line(&progress), "render    40% (25.6 of 64 samples, 1.50 s left)");
+        let by_noise = RenderProgress { is_total_fixed: false, ..progress };
+        assert_eq!(line(&by_noise), "render    40% (about 25 samples per pixel so far, 1.50 s left)");
+        let early = RenderProgress { elapsed_seconds: 0.1, ..progress };
+        assert_eq!(line(&early), "render    40% (25.6 of 64 samples)");
+        assert!(!line(&RenderProgress { eta_seconds: None, ..progress }).contains("left"));
+    }
+}

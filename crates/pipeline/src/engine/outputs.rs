@@ -1,0 +1,144 @@
+//! Files that the engine writes, and those that it must not.
+
+use super::super::plan::Plan;
+use super::super::protocol::{ImageReport, Report, Request, Writing};
+use super::super::render::film_state::FilmState;
+use super::super::report::finish::write_report;
+use super::super::sink::Sink;
+use super::super::stages::write::{Destination, write_by_hand, write_if_wanted, write_moving};
+use super::super::stages::{Findings, Staged, Stop};
+use super::super::targets::conflicts;
+use super::Engine;
+use crate::control::CancelToken;
+use crate::output::OutputError;
+
+impl Engine {
+    /// Whether there is a picture without holes.
+    pub(crate) fn can_write(&self) -> bool {
+        self.films.current().is_some_and(FilmState::is_covered)
+    }
+
+    /// Write the picture as it is, outside of a request.
+    pub(crate) fn write_now(&mut self, sink: &Sink) {
+        let (Some(canvas), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
+            return sink.write_failed(None, "there is no picture yet".to_owned());
+        };
+        if !canvas.is_covered() {
+            // Pictures of before are there.
+            let what = if self.written.is_empty() { "nothing is" } else { "the newest picture is not" };
+            let message = format!("{what} written: the render was stopped before every pixel had a sample");
+            return sink.write_failed(None, message);
+        }
+        if self.is_broken
+            && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)
+        {
+            let path = path.display();
+            let message = format!(
+                "nothing is written: the scene has errors and may name {path}, which was not written by this run; mend \
+                 the scene first"
+            );
+            return sink.write_failed(None, message);
+        }
+        let to = Destination {
+            plan,
+            layers: &self.layers,
+            inputs: &self.inputs,
+            contents: &self.contents,
+            is_own: self.is_own,
+            sink,
+        };
+        let written = &mut self.written;
+        let is_written = pool.install(|| write_by_hand(canvas, to, written));
+        let is_finished = canvas.is_finished(plan);
+        self.note_written(is_written && is_finished && self.is_own);
+        if is_written {
+            self.report_by_hand(sink);
+        }
+    }
+
+    /// Looks for outputs that must not be written. If the request can go on without them, tells the front end and keeps the
+    /// conflicts in the findings.
+    ///
+    /// # Errors
+    /// All conflicts, where the picture must be written.
+    pub(super) fn look_for_conflicts(
+        &self,
+        request: &Request,
+        plan: &Plan,
+        findings: &mut Findings,
+        sink: &Sink,
+    ) -> Result<(), Stop> {
+        let found = conflicts(plan, &self.inputs);
+        if found.is_empty() {
+            findings.conflicts = found;
+            return Ok(());
+        }
+        if request.write == Writing::Must {
+            findings.errors.extend(found);
+            return Err(Stop::Failed(findings.take_failure()));
+        }
+        if found != findings.conflicts {
+            sink.refused(found.clone());
+        }
+        findings.conflicts = found;
+        Ok(())
+    }
+
+    /// Writes the report of an image that a key has written, if its render is finished.
+    fn report_by_hand(&self, sink: &Sink) {
+        let (Some(report), Some(plan)) = (&self.report, &self.plan) else { return };
+        let paths: Vec<String> =
+            plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
+        let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
+        // Nobody cancels this token: a key ordered this image.
+        self.write_report(&Report { image, ..report.clone() }, sink, &CancelToken::new());
+    }
+
+    /// Writes the report of a request's image that is in its files, or could not be written.
+    pub(super) fn write_report(&self, report: &Report, sink: &Sink, token: &CancelToken) {
+        let Some(plan) = &self.plan else { return };
+        if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
+            let is_cancelled = matches!(error, OutputError::Cancelled(_));
+            let message =
+                if is_cancelled { format!("the report is not written: {error}") } else { error.to_string() };
+            sink.write_failed(None, message);
+        }
+    }
+
+    /// Whether the picture is on disk then.
+    pub(super) fn write(
+        &mut self,
+        request: &Request,
+        plan: &Plan,
+        findings: &Findings,
+        sink: &Sink,
+        token: &CancelToken,
+    ) -> Result<Staged<bool>, Stop> {
+        if let Some(conflict) = findings.conflicts.first() {
+            return Ok(Staged::skipped(false, conflict.message.clone()));
+        }
+        if request.own.is_some() {
+            return self.write_own(sink, token);
+        }
+        let pool = self.pool(plan.threads)?;
+        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let to = Destination {
+            plan,
+            layers: &self.layers,
+            inputs: &self.inputs,
+            contents: &self.contents,
+            is_own: true,
+            sink,
+        };
+        let written = &mut self.written;
+        let wrote = match plan.outputs.is_empty() {
+            true => Staged::done(true, ""),
+            false => pool.install(|| write_if_wanted(request.write, canvas, to, written, token))?,
+        };
+        let own = self.own.as_ref().filter(|_| wrote.value);
+        written.own = own.map(|own| own.image);
+        let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
+        let frames = &mut self.frames;
+        pool.install(|| write_moving(canvas, to, (turn, frames), token))
+    }
+}

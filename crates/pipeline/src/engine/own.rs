@@ -1,0 +1,217 @@
+//! The scene's own image: the image of the scene file as saved, with the overrides of the command line. Keys may show something else
+//! meanwhile. Its film, its checkpoint and its files are kept until a request returns to it.
+
+use std::sync::Arc;
+
+use super::orders::Interruption;
+use super::{Engine, Ready};
+use crate::assembly::Eye;
+use crate::control::CancelToken;
+use crate::identity::Depends;
+use crate::keys;
+use crate::output::part::Trait;
+use crate::plan::{Plan, plan};
+use crate::protocol::{Failure, OwnState, Request, Status, Writing};
+use crate::render::keeping::{Around, Keeping};
+use crate::render::share::Share;
+use crate::scene::description::CameraChange;
+use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::settings::{Checkpoints, Overrides, Resume};
+use crate::sink::Sink;
+use crate::stages::parse::Parsed;
+use crate::stages::write::{Destination, finish, write_if_wanted};
+use crate::stages::{Staged, Stop};
+use crate::watch::content::FileRead;
+use crate::world::TextureNeeds;
+
+/// The scene's own image, as the newest request found the scene.
+pub(super) struct OwnImage {
+    /// Key of its film.
+    pub(super) film: Key,
+    /// Key of the finished image and its files.
+    pub(super) image: Key,
+    parsed: Arc<Parsed>,
+    pub(super) plan: Plan,
+    camera: CameraChange,
+    /// The files that it is made of.
+    files: Vec<FileRead>,
+    /// The share of the image that this process renders. `None` for all of it.
+    pub(super) share: Option<Share>,
+}
+
+impl OwnImage {
+    /// `eye` is the scene's own camera; `surfaces` and `of` are the keys of the scene.
+    pub(super) fn new(
+        (parsed, plan, eye): (&Arc<Parsed>, Plan, &Eye),
+        (surfaces, meshes): (&Key, &[Key]),
+        (camera, files): (CameraChange, &[FileRead]),
+    ) -> Self {
+        let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
+        let of = keys::referents(&plan.scene, meshes, orbiter.as_deref());
+        let world = keys::world(surfaces, &eye.camera, &of);
+        let film = keys::render(world, &plan.settings, plan.crop);
+        let image = image_key(film, &plan);
+        Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
+    }
+
+    /// Names and values of everything that the image depends on.
+    pub(super) fn identity(&self) -> Vec<Trait> {
+        let divided = self.share.as_ref().map(|share| share.samples);
+        let Self { parsed, plan, camera, files, .. } = self;
+        Depends { parsed, plan, camera, files, divided }.traits()
+    }
+}
+
+/// Key of a finished image and its files.
+fn image_key(film: Key, plan: &Plan) -> Key {
+    let mut key = Fingerprint::new("own image");
+    key.key(&keys::image(film, plan, 0)).u64(plan.bit_depth.into());
+    plan.layers.iter().for_each(|layer| {
+        key.choice(*layer);
+    });
+    plan.outputs.iter().for_each(|path| {
+        key.path(path);
+    });
+    key.finish()
+}
+
+impl Engine {
+    /// Takes up the scene's own image of a request. Its film stays, whatever else is rendered.
+    pub(super) fn take_own(&mut self, mut own: OwnImage) {
+        self.films.pin(own.film);
+        if let Some(before) = self.own.take().filter(|before| before.film == own.film) {
+            own.share = before.share;
+        }
+        self.own = Some(own);
+    }
+
+    /// Notes the share of the scene's own image, if the request is of it.
+    pub(super) fn share_own(&mut self, request: &Request, ready: &Ready) {
+        if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
+            own.share.clone_from(&ready.share);
+        }
+    }
+
+    /// Tells the state of the scene's own image to a front end that shows something else.
+    pub(super) fn say_own(&self, request: &Request, film: Key, sink: &Sink) {
+        let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
+        sink.own_image(match self.films.of(own.film) {
+            _ if self.is_own_written() => OwnState::Written,
+            Some(canvas) if canvas.is_begun() => OwnState::Begun { is_rendering: own.film == film },
+            Some(_) | None => OwnState::NotBegun,
+        });
+    }
+
+    /// Whether the files of the scene's own image hold it.
+    pub(super) fn is_own_written(&self) -> bool {
+        self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
+    }
+
+    /// Notes whether the files of the current plan hold its finished image now.
+    pub(super) fn note_written(&mut self, is_written: bool) {
+        let own = self.own.as_ref().filter(|_| is_written && self.is_own);
+        self.written.own = own.map(|own| own.image);
+    }
+
+    /// Writes the scene's own image, if the film that is shown in another way is its finished film.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(super) fn write_own(&mut self, sink: &Sink, token: &CancelToken) -> Result<Staged<bool>, Stop> {
+        let only_shown = || Ok(Staged::skipped(false, "it is only shown"));
+        if self.is_own_written() {
+            return only_shown();
+        }
+        let (Some(own), Some(canvas), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
+            return only_shown();
+        };
+        let is_simple = own.plan.layers.is_empty() && own.plan.turn.is_none() && !own.plan.outputs.is_empty();
+        if canvas.key != own.film || !is_simple || !canvas.is_finished(&own.plan) {
+            return only_shown();
+        }
+        let to = Destination {
+            plan: &own.plan,
+            layers: &[],
+            inputs: &self.inputs,
+            contents: &self.contents,
+            is_own: true,
+            sink,
+        };
+        let written = &mut self.written;
+        let wrote = pool.install(|| write_if_wanted(Writing::Try, canvas, to, written, token))?;
+        written.own = wrote.value.then_some(own.image);
+        Ok(Staged { value: false, status: Status::Skipped, why: "it is only shown".to_owned() })
+    }
+
+    /// Does something with the checkpoints of a film, if it is that of the scene's own image and has any.
+    pub(super) fn with_keeping<T>(
+        &self,
+        film: Option<Key>,
+        sink: &Sink,
+        interruption: &dyn Fn() -> Interruption,
+        work: impl FnOnce(Option<&Keeping<'_>>, &Self) -> T,
+    ) -> T {
+        let own = self.own.as_ref().filter(|own| film == Some(own.film) && keeps(&own.plan));
+        let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
+            return work(None, self);
+        };
+        let finish = finish(&own.plan);
+        let name = || own.identity();
+        let around = Around {
+            finish: &finish,
+            inputs: &self.inputs,
+            sink,
+            name: &name,
+            interruption,
+            claim: &self.claim,
+        };
+        work(Some(&Keeping::new(output, own.plan.checkpoints, around)), self)
+    }
+
+    /// Writes the checkpoint of the scene's own render when the worker ends while something else is shown.
+    pub(crate) fn keep_own(&self, sink: &Sink, interruption: Interruption) {
+        let Some(own) = self.own.as_ref().filter(|_| !self.is_own_written()) else { return };
+        let Some(canvas) = self.films.of(own.film).filter(|canvas| !canvas.is_kept) else { return };
+        self.with_keeping(Some(own.film), sink, &|| interruption, |keeping, _| {
+            if let Some(keeping) = keeping {
+                keeping.recognize(canvas);
+                keeping.at_the_end(canvas, canvas.traced, canvas.render_seconds);
+            }
+        });
+    }
+}
+
+/// Whether the renders of a plan have checkpoints: its image is written to a file, and they are not switched off, or it goes on from
+/// one.
+fn keeps(plan: &Plan) -> bool {
+    let is_file =
+        plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
+    let Checkpoints { seconds, resume, .. } = plan.checkpoints;
+    (seconds > 0.0 || resume == Resume::Asked) && is_file
+}
+
+/// Plan of the scene's own image, if the request shows something else.
+///
+/// # Errors
+/// Those of [`plan`].
+pub(super) fn own_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
+    let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
+    let own = request.own.as_deref().map(plan).transpose();
+    own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
+}
+
+/// Textures that a request looks up. The keys of the films of both plans are made of them.
+pub(super) fn lookups(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
+    let shown = plan.settings.lookups();
+    own.map_or(shown, |own| shown.or(own.settings.lookups()))
+}
+
+/// Overrides of the scene's own image in a request.
+pub(super) fn overrides(request: &Request) -> &Overrides {
+    request.own.as_deref().unwrap_or(&request.overrides)
+}
+
+/// Whether the film of the scene's own image is to become a file.
+pub(super) fn is_to_be_written(request: &Request) -> bool {
+    request.own.is_some() || request.write != Writing::No
+}

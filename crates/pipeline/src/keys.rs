@@ -1,0 +1,350 @@
+//! Keys of the values that later stages read of a scene. They leave out places in the file and names, so that comments, the order
+//! of keys and unused tables change nothing.
+
+use crate::film::Rect;
+use crate::integrators::{PhotonSettings, RenderSettings};
+use crate::math::DVec3;
+use crate::plan::Plan;
+use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
+use crate::scene::fingerprint::{Fingerprint, Key, Referents};
+
+/// Textures, meshes and orbiter that descriptions refer to by index.
+pub(crate) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
+    Referents { textures: &scene.textures, meshes, orbiter }
+}
+
+/// Key of a mesh's tree.
+pub(crate) fn tree(mesh: &Key, accel: Accel) -> Key {
+    Fingerprint::new("tree").key(mesh).choice(accel).finish()
+}
+
+/// Key of all geometry in trees, with each object moved by its lift; `lifts` is empty if no object is moved.
+pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec3, &[DVec3])) -> Key {
+    let mut key = Fingerprint::new("lifted");
+    key.key(&from(&shapes(scene, of), origin));
+    for lift in lifts {
+        key.dvec3(*lift);
+    }
+    in_trees(&key.finish(), scene.render.accel)
+}
+
+/// Key of shapes and of which of them emit: lights in the plane of other shapes are moved.
+pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
+    let mut key = Fingerprint::new("coplanar");
+    key.key(&shapes(scene, of));
+    let is_round = |object: &&Object| matches!(object.shape, Shape::Sphere { .. } | Shape::Torus { .. });
+    for object in scene.objects.iter().filter(|object| !is_round(object)) {
+        let material = object.material.map(|index| &scene.materials[index]);
+        let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
+        key.flag(object.material.is_some()).flag(emission.is_some());
+        if let Some(sides) = emission {
+            key.choice(sides);
+        }
+    }
+    key.finish()
+}
+
+/// These things in coordinates that start somewhere.
+pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
+    Fingerprint::new("from").key(of).dvec3(origin).finish()
+}
+
+/// Key of geometry in trees of a kind.
+pub(crate) fn in_trees(of: &Key, accel: Accel) -> Key {
+    Fingerprint::new("in trees").key(of).choice(accel).finish()
+}
+
+fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
+    let mut key = Fingerprint::new("shapes");
+    for object in &scene.objects {
+        key.add(&object.shape, of);
+    }
+    key.finish()
+}
+
+/// Key of the scene's surfaces, and of what those of glass are made of.
+pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
+    let mut key = Fingerprint::new("glass");
+    key.key(&shapes(scene, of));
+    for object in &scene.objects {
+        let substance = object.material.and_then(|index| scene.materials[index].kind.substance());
+        key.flag(object.material.is_some()).flag(substance.is_some());
+        for part in substance.into_iter().flatten() {
+            key.u64(part);
+        }
+    }
+    key.finish()
+}
+
+/// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
+/// lamps may have on them.
+pub(crate) fn lights(
+    scene: &Scene,
+    of: &Referents<'_>,
+    (origin, lifts): (DVec3, &[DVec3]),
+    (sky, patterns): (Option<&Key>, &[&Key]),
+) -> Key {
+    let mut key = Fingerprint::new("lights");
+    key.key(&from(&described_lights(scene, of), origin)).flag(sky.is_some());
+    for lift in lifts {
+        key.dvec3(*lift);
+    }
+    if let Some(sky) = sky {
+        key.key(sky);
+    }
+    for pattern in patterns {
+        key.key(pattern);
+    }
+    key.finish()
+}
+
+fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
+    let mut key = Fingerprint::new("described lights");
+    key.add(&scene.environment, of);
+    for light in &scene.lights {
+        key.add(light, of);
+    }
+    for (number, object) in scene.objects.iter().enumerate() {
+        match object.material.map(|index| &scene.materials[index]) {
+            Some(material) if !material.emits() => {}
+            Some(material) => {
+                key.index(number)
+                    .add(&object.shape, of)
+                    .add(&material.emission, of)
+                    .add(&material.opacity, of);
+                for number in material.emission_coat().iter().flatten() {
+                    key.add(number, of);
+                }
+            }
+            // The file's own materials may emit.
+            None => {
+                key.index(number).add(&object.shape, of).text("own");
+            }
+        }
+    }
+    key.finish()
+}
+
+/// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
+pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
+    Fingerprint::new("world").key(surfaces).add(camera, of).finish()
+}
+
+/// Everything that photons depend on: what they meet, in coordinates that start somewhere, how they are sent and how far they go.
+pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
+    let PhotonSettings { count, radius, bounces } = photons;
+    let mut key = Fingerprint::new("photons");
+    key.key(&from(surfaces, origin)).u64(count.into()).f32(radius).u64(bounces.into());
+    key.u64(render.max_depth.into()).u64(render.seed.into()).finish()
+}
+
+/// Everything that light meets.
+pub(crate) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
+    let mut key = Fingerprint::new("surfaces");
+    key.key(&shapes(scene, of)).key(&described_lights(scene, of));
+    for object in &scene.objects {
+        match object.material {
+            Some(index) => key.index(1).add(&scene.materials[index], of),
+            None => key.index(0),
+        };
+        key.flag(object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors));
+    }
+    for texture in textures {
+        key.key(texture);
+    }
+    key.finish()
+}
+
+/// Everything that a film's sums depend on, apart from the number of samples.
+pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
+    let mut key = Fingerprint::new("render");
+    key.key(&world).add(settings, &Referents::default());
+    if let Some(rect) = crop {
+        key.u64(rect.x.into()).u64(rect.y.into()).u64(rect.width.into()).u64(rect.height.into());
+    }
+    key.finish()
+}
+
+/// Key of the image that a film becomes, as it is shown. Films under a budget of time differ in their noise: `film_number` tells
+/// them apart.
+pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
+    let Render { samples, error, .. } = plan.settings.render;
+    let mut key = Fingerprint::new("image");
+    key.key(&film).u64(samples.into()).f32(error);
+    key.choice(plan.settings.view).f32(plan.tone.exposure_stops).choice(plan.tone.curve);
+    if let Some(seconds) = plan.time_seconds {
+        key.f64(seconds).u64(film_number);
+    }
+    key.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrators::View;
+    use crate::math::Vec3;
+    use crate::scene::description::{Integrator, PixelFilter, Shadows, Tonemap};
+    use crate::tests::loaded_of;
+
+    const BALL: &str = "[materials.m]\ntype = \"phong\"\ndiffuse = [1, 0, 0]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n";
+
+    fn keys(text: &str) -> (Key, Key, Key) {
+        let scene = loaded_of(text).scene;
+        let of = referents(&scene, &[], None);
+        (
+            geometry(&scene, &of, (DVec3::ZERO, &[])),
+            lights(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
+            world(&surfaces(&scene, &of, &[]), &scene.camera, &of),
+        )
+    }
+
+    #[test]
+    fn comments_and_unused_tables_change_no_key() {
+        assert_eq!(keys(BALL), keys(&format!("# hello\n[materials.a]\ntype = \"phong\"\n{BALL}")));
+    }
+
+    #[test]
+    fn a_colour_changes_the_world_but_no_tree() {
+        let (before, after) = (keys(BALL), keys(&BALL.replace("[1, 0, 0]", "[0, 1, 0]")));
+        assert_eq!((before.0, before.1), (after.0, after.1));
+        assert_ne!(before.2, after.2);
+    }
+
+    #[test]
+    fn another_kind_of_tree_changes_the_trees_but_no_picture() {
+        let (before, after) = (keys(BALL), keys(&format!("[render]\naccel = \"kdtree\"\n{BALL}")));
+        assert_ne!(before.0, after.0);
+        assert_eq!((before.1, before.2), (after.1, after.2));
+    }
+
+    #[test]
+    fn an_emission_changes_the_lights_and_a_place_the_trees() {
+        let lit = keys(&BALL.replace("diffuse", "emission"));
+        assert_eq!(lit.0, keys(BALL).0);
+        assert_ne!(lit.1, keys(BALL).1);
+        assert_ne!(keys(&BALL.replace("center = [0", "center = [1")).0, keys(BALL).0);
+        let lifted = |lift: DVec3| {
+            let scene = loaded_of(BALL).scene;
+            geometry(&scene, &referents(&scene, &[], None), (DVec3::ZERO, &[lift]))
+        };
+        assert_ne!(lifted(DVec3::X), lifted(DVec3::Y));
+    }
+
+    #[test]
+    fn another_number_of_a_light_s_object_changes_the_lights() {
+        let ball = "[[sphere]]\ncenter = [3, 0, 0]\nradius = 1\nmaterial = \"dark\"\n";
+        let (dark, lamp) = ("[materials.dark]\n".to_owned(), BALL.replace("diffuse", "emission"));
+        let [behind, before] = [dark.clone() + &lamp + ball, dark + ball + &lamp].map(|text| keys(&text).1);
+        assert_ne!(behind, before);
+    }
+
+    #[test]
+    fn an_environment_changes_the_lights_and_no_tree() {
+        let around = |color: &str| keys(&format!("[environment]\ncolor = {color}\n{BALL}"));
+        let (none, grey, red) = (keys(BALL), around("0.5"), around("\"red\""));
+        assert_eq!((none.0, none.0), (grey.0, red.0));
+        assert!(none.1 != grey.1 && grey.1 != red.1 && none.2 != grey.2 && grey.2 != red.2);
+    }
+
+    #[test]
+    fn what_only_the_camera_sees_changes_no_light() {
+        let lamp = BALL.replace("diffuse", "emission");
+        let of = |text: &str| keys(&format!("{text}{lamp}")).1;
+        for other in
+            ["[camera]\nfov = 20\n", "[render]\nbackground = [1, 0, 0]\nambient = [1, 1, 1]\nseed = 4\n"]
+        {
+            assert_eq!(of(""), of(other), "{other}");
+        }
+    }
+
+    #[test]
+    fn every_setting_of_a_render_is_part_of_its_key() {
+        let scene = loaded_of(BALL).scene;
+        let plan = crate::plan::plan(&scene, std::path::Path::new("a.toml"), &Default::default());
+        let settings = plan.expect("a plan").settings;
+        let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
+        let render_settings = settings.render;
+        // Without `..`: a field that is added does not compile until it has a line below.
+        let RenderSettings { render: _, dof, view, photons } = settings;
+        let Render {
+            width,
+            height,
+            samples,
+            error,
+            shadow_samples,
+            max_depth,
+            integrator,
+            shadows,
+            clamp,
+            ambient,
+            background,
+            filter,
+            exposure,
+            tonemap,
+            accel,
+            seed,
+        } = render_settings;
+        assert_eq!((integrator, shadows, clamp), (Integrator::Whitted, Shadows::Soft, 0.0));
+        let path = Render { integrator: Integrator::Path, ..render_settings };
+        assert_eq!(
+            (filter, view, tonemap, accel),
+            (PixelFilter::Box, View::Beauty, Tonemap::None, Accel::Bvh)
+        );
+        let with = |render: Render| RenderSettings { render, ..settings };
+        assert_eq!(photons, None);
+        let some = PhotonSettings { count: 7, radius: 0.0, bounces: 2 };
+        let with_photons = |photons| RenderSettings { photons: Some(photons), ..settings };
+        let gathering = with_photons(some);
+        let others = [
+            with(Render { width: width + 1, ..render_settings }),
+            with(Render { height: height + 1, ..render_settings }),
+            with(Render { error: error + 0.5, ..render_settings }),
+            with(Render { shadow_samples: shadow_samples + 1, ..render_settings }),
+            with(Render { max_depth: max_depth + 1, ..render_settings }),
+            with(Render { shadows: Shadows::Hard, ..render_settings }),
+            with(Render { shadows: Shadows::Off, ..render_settings }),
+            with(path),
+            with(Render { clamp: 1.0, ..path }),
+            with(Render { ambient: ambient + Vec3::ONE, ..render_settings }),
+            with(Render { background: background + Vec3::ONE, ..render_settings }),
+            with(Render { filter: PixelFilter::Tent, ..render_settings }),
+            with(Render { seed: seed + 1, ..render_settings }),
+            RenderSettings { dof: !dof, ..settings },
+            RenderSettings { view: View::Uv, ..settings },
+            gathering,
+            with_photons(PhotonSettings { count: 8, ..some }),
+            with_photons(PhotonSettings { radius: 0.5, ..some }),
+            with_photons(PhotonSettings { bounces: 3, ..some }),
+        ];
+        let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
+        assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
+        assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
+        // The same samples: more of them, shown in another way, or found by another tree.
+        for same in [
+            Render { samples: samples + 1, ..render_settings },
+            Render { exposure: exposure + 1.0, ..render_settings },
+            Render { tonemap: Tonemap::Aces, ..render_settings },
+            Render { accel: Accel::KdTree, ..render_settings },
+        ] {
+            assert_eq!(of(&with(same)), of(&settings), "{same:?}");
+        }
+        // The views that show the trees are other pictures by another tree.
+        for view in [View::Bounds, View::Cost] {
+            let by = |accel| RenderSettings { view, ..with(Render { accel, ..render_settings }) };
+            assert_ne!(of(&by(Accel::Bvh)), of(&by(Accel::KdTree)), "{view:?}");
+        }
+        // What path ignores, and whitted.
+        for same in
+            [Render { shadows: Shadows::Hard, ..path }, Render { ambient: ambient + Vec3::ONE, ..path }]
+        {
+            assert_eq!(of(&with(same)), of(&with(path)), "{same:?}");
+        }
+        assert_eq!(of(&with(Render { clamp: 1.0, ..render_settings })), of(&settings));
+        let mut keys: Vec<Key> = others.iter().chain([&settings]).map(of).collect();
+        let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
+        keys.push(render(Fingerprint::new("w").finish(), &settings, Some(crop)));
+        for (i, key) in keys.iter().enumerate() {
+            assert!(!keys[..i].contains(key), "{i} is told apart");
+        }
+    }
+}

@@ -1,0 +1,173 @@
+//! The camera that frames a model, and its light.
+
+use super::toml::rounded;
+use crate::math::DVec3;
+use crate::settings::Side;
+use crate::turntable::Turn;
+
+/// Vertical angle in degrees.
+pub(super) const FOV: f64 = 30.0;
+/// Part of the picture's half height and half width that the model's points may fill.
+const FILLED: f64 = 0.88;
+
+/// Least size of a model.
+const LEAST: f64 = 1e-30;
+
+/// Pictures of a turntable that are measured: more are all alike.
+const MOST_MEASURED: u32 = 72;
+
+/// A camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Eye {
+    pub(super) position: DVec3,
+    pub(super) look_at: DVec3,
+    pub(super) up: DVec3,
+}
+
+impl Side {
+    /// The way from the model to the eye, and what is up in the picture. Fronts face +z.
+    fn axes(self) -> (DVec3, DVec3) {
+        match self {
+            Self::Front => (DVec3::Z, DVec3::Y),
+            Self::Back => (DVec3::NEG_Z, DVec3::Y),
+            Self::Left => (DVec3::NEG_X, DVec3::Y),
+            Self::Right => (DVec3::X, DVec3::Y),
+            Self::Top => (DVec3::Y, DVec3::NEG_Z),
+            Self::Bottom => (DVec3::NEG_Y, DVec3::Z),
+            Self::Iso => (DVec3::new(0.8, 0.62, 1.0).normalize(), DVec3::Y),
+        }
+    }
+}
+
+/// The eye that sees a box, of which only these points are to be seen, as large as a picture of this width over height allows, and
+/// all pictures of a turntable with so many.
+pub(super) fn framed(
+    [least, greatest]: [DVec3; 2],
+    points: &[DVec3],
+    (from, turns): (Side, u32),
+    aspect: f64,
+) -> Eye {
+    let (back, up) = from.axes();
+    let middle = (least + greatest) * 0.5;
+    let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
+    // Every point lies inside the frame.
+    let half = (greatest - least) * 0.5;
+    let mut distance = 0.0_f64;
+    for back in Turn::arms(turns.min(MOST_MEASURED), back, up) {
+        let right = up.cross(back).normalize_or(DVec3::X);
+        let above = back.cross(right);
+        for point in points {
+            let at = *point - middle;
+            let (across, upwards, near) = (at.dot(right).abs(), at.dot(above).abs(), at.dot(back));
+            distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
+        }
+    }
+    let distance = distance.max(LEAST);
+    // Digits that nobody sees are left out.
+    let size = half.length().max(LEAST);
+    let step = size * 1e-4;
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
+    Eye { position: tidy(middle + back * distance), look_at: tidy(middle), up }
+}
+
+/// A number as a multiple of a power of ten near a step.
+pub(super) fn tidied(value: f64, step: f64) -> f64 {
+    let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
+    let whole = (value / unit).round();
+    // A division gives fewer digits than a product with a fraction.
+    if unit < 1.0 { whole / libm::round(1.0 / unit) } else { whole * unit }
+}
+
+/// Elevation of the key light in degrees.
+const ELEVATION: f64 = 50.0;
+/// Angle in degrees from the eye to the key light, to the left.
+const ASIDE: f64 = 40.0;
+
+/// The way that the key light travels: from above the left shoulder of whoever looks.
+pub(super) fn key_direction(eye: &Eye) -> DVec3 {
+    let back = eye.position - eye.look_at;
+    // Seen from straight above or below, the front counts.
+    let flat = DVec3::new(back.x, 0.0, back.z);
+    let flat = if flat.length() > 1e-3 * back.length() { flat.normalize() } else { DVec3::Z };
+    let (sin, cos) = (libm::sin(ASIDE.to_radians()), libm::cos(ASIDE.to_radians()));
+    let aside = DVec3::new(flat.x * cos - flat.z * sin, 0.0, flat.x * sin + flat.z * cos);
+    let (rise, run) = (libm::sin(ELEVATION.to_radians()), libm::cos(ELEVATION.to_radians()));
+    let towards = aside * run + DVec3::Y * rise;
+    DVec3::from((-towards).to_array().map(|part| rounded(part, 2)))
+}
+
+/// Radiance of the sky.
+pub(super) const SKY: f64 = 0.5;
+/// Irradiance of the key light at normal incidence.
+pub(super) const KEY: f64 = 1.5;
+
+/// Reflectance of a level ground that is as bright as the sky behind it, so that no horizon is seen: what the sky brings,
+/// π·SKY, and the key light, over π.
+pub(super) fn ground_reflectance() -> f64 {
+    let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
+    rounded(SKY / (SKY + key), 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_corner_is_inside_the_frame_and_one_is_near_its_edge() {
+        let bounds = [DVec3::new(-1.0, 2.0, -3.0), DVec3::new(4.0, 3.0, 0.5)];
+        for from in [Side::Front, Side::Back, Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Iso] {
+            for aspect in [0.5, 1.0, 4.0 / 3.0, 3.0] {
+                let corners: Vec<DVec3> = (0..8)
+                    .map(|corner| DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis])))
+                    .collect();
+                let eye = framed(bounds, &corners, (from, 1), aspect);
+                let back = (eye.position - eye.look_at).normalize();
+                let right = eye.up.cross(back).normalize();
+                let above = back.cross(right);
+                let tangent = libm::tan((FOV * 0.5).to_radians());
+                let mut most = 0.0_f64;
+                for corner in 0..8 {
+                    let at = DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis]))
+                        - eye.position;
+                    let depth = -at.dot(back);
+                    assert!(depth > 0.0);
+                    most = most.max((at.dot(right) / (depth * tangent * aspect)).abs());
+                    most = most.max((at.dot(above) / (depth * tangent)).abs());
+                }
+                assert!(most < 0.9 && most > 0.86, "{from:?} {aspect}: {most}");
+            }
+        }
+    }
+
+    /// A long model that is seen from its end stays in the frame when it is seen from its side.
+    #[test]
+    fn every_picture_of_a_turntable_has_the_model_in_it() {
+        let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
+        let corners = [bounds[0], bounds[1], DVec3::new(-0.5, 1.0, 4.0), DVec3::new(0.5, 0.0, -4.0)];
+        let distance = |turns| {
+            let eye = framed(bounds, &corners, (Side::Front, turns), 1.0);
+            (eye.position - eye.look_at).length()
+        };
+        let side = framed(bounds, &corners, (Side::Right, 1), 1.0);
+        let of_side = (side.position - side.look_at).length();
+        assert!(distance(1) < 0.6 * of_side && distance(4) >= of_side - 1e-3, "{} {of_side}", distance(4));
+    }
+
+    #[test]
+    fn digits_that_nobody_sees_are_left_out() {
+        assert_eq!(tidied(1.234_567_8, 3e-4), 1.2346);
+        assert_eq!(tidied(-12_345.678, 30.0), -12_350.0);
+    }
+
+    /// A plane under the sky and the key light alone has the sky's radiance.
+    #[test]
+    fn the_ground_is_as_bright_as_the_sky() {
+        let eye = framed([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
+        let direction = key_direction(&eye).normalize();
+        let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
+        let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;
+        assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");
+        let to_eye = (eye.position - eye.look_at).normalize();
+        assert!((-direction).dot(to_eye) > 0.3, "it comes from the side of the eye");
+    }
+}

@@ -1,0 +1,381 @@
+//! Scenes of glTF files.
+
+use std::collections::{BTreeSet, HashMap};
+use std::io::Read;
+use std::path::Path;
+
+use super::frame::{framed, tidied};
+use super::materials::{Materials, TextureFile};
+use super::toml::{Toml, color, list, number, vector};
+use super::{
+    Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
+    render,
+};
+use crate::assets::gltf::{
+    Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
+    ModelScene, Slot,
+};
+use crate::assets::{AssetError, Companion};
+use crate::control::{CancelToken, ignore_progress};
+use crate::math::color::luminance;
+use crate::math::{DMat3, DVec3};
+use crate::scene::keys::endings::MAPS;
+use crate::scene::quoted;
+use crate::settings::Side;
+use crate::stages::containers::Containers;
+
+/// The files in which the text finds parts and images.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Naming {
+    /// In the glTF file and the files that it names.
+    Inside,
+    /// In a folder of files of their own, beside the text.
+    Folder(String),
+}
+
+/// A file that the text names.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Asset {
+    /// Its name, relative to the text.
+    pub(crate) name: String,
+    /// Its content.
+    pub(crate) content: Content,
+}
+
+/// The content of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Content {
+    /// A part as PLY.
+    Part(usize),
+    /// An image as it is.
+    Image(usize),
+}
+
+/// The scene of a glTF file.
+pub(super) fn text(
+    path: &Path,
+    (show, naming): (Show, &Naming),
+    containers: &Containers,
+    token: &CancelToken,
+) -> Result<ModelText, AssetError> {
+    let container = containers.open(path, &ignore_progress, token)?;
+    let scene = container.scene(token)?;
+    let Some(bounds) = scene.bounds else {
+        let reason = "its scene shows no faces".to_owned();
+        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+    };
+    let mut writer = Writer {
+        container: &container,
+        path,
+        naming,
+        toml: Toml::default(),
+        files: Unique::default(),
+        assets: Vec::new(),
+        names: HashMap::new(),
+        images: BTreeSet::new(),
+        image_names: scene.images.clone(),
+        companions: container.companions().to_vec(),
+    };
+    writer.write(&scene, bounds, show);
+    let Writer { toml, assets, images, companions, .. } = writer;
+    let is_unseen = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
+    let ModelScene { mut notes, .. } = scene;
+    match naming {
+        // A model is shown without images that cannot be read.
+        Naming::Inside => notes.extend(is_unseen.then(|| UNSEEN.to_owned())),
+        Naming::Folder(_) => {
+            images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
+        }
+    }
+    Ok(ModelText { text: toml.finish(), hash: container.hash(), companions, notes, assets })
+}
+
+struct Writer<'a> {
+    container: &'a Container,
+    path: &'a Path,
+    naming: &'a Naming,
+    toml: Toml,
+    /// Names of files in the folder.
+    files: Unique,
+    assets: Vec<Asset>,
+    names: HashMap<Content, String>,
+    /// Images that materials show.
+    images: BTreeSet<usize>,
+    image_names: Vec<String>,
+    /// Other files that the text was made of.
+    companions: Vec<Companion>,
+}
+
+impl Writer<'_> {
+    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: Show) {
+        // Say what this is, and what it is not.
+        self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
+        for note in &scene.notes {
+            self.toml.comment(note);
+        }
+        // The picture, its camera and its light.
+        let own = scene.cameras.first().filter(|_| show.from.is_none());
+        let aspect = show.aspect.or(own.and_then(|camera| camera.aspect));
+        let size = own
+            .and_then(|camera| camera.aspect)
+            .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
+        let lighting = match scene.lights.is_empty() {
+            true => Lighting::Ours { is_polished: scene.materials.iter().any(is_polished) },
+            false => Lighting::own(irradiance(&scene.lights, bounds)),
+        };
+        render(&mut self.toml, size, lighting);
+        let eye = match own {
+            Some(own) => {
+                let eye = eye_of(own, bounds);
+                camera(&mut self.toml, &eye, own.fov);
+                eye
+            }
+            None => {
+                let eye = framed(
+                    bounds,
+                    &scene.outline,
+                    (show.from.unwrap_or(Side::Iso), show.turns),
+                    aspect.unwrap_or(SIZE[0] / SIZE[1]),
+                );
+                camera(&mut self.toml, &eye, FOV);
+                eye
+            }
+        };
+        light(&mut self.toml, &eye, lighting);
+        if !scene.lights.is_empty() {
+            self.toml.section("1 cd of the file counts as 1 W/sr, 1 lx as 1 W/m².");
+        }
+        scene.lights.iter().for_each(|light| self.light(light));
+        // Materials, then what has them.
+        let mut names = Unique::default();
+        let materials = Materials::write(scene, &mut names, self);
+        let mut shapes = Unique::default();
+        for instance in &scene.instances {
+            self.mesh(instance, &materials[instance.material], &mut shapes);
+        }
+        ground(&mut self.toml, &mut names, bounds, &eye);
+    }
+
+    fn light(&mut self, light: &ModelLight) {
+        let toml = &mut self.toml;
+        toml.table("[[light]]");
+        if !light.name.is_empty() {
+            toml.comment(&light.name);
+        }
+        match light.kind {
+            ModelLightKind::Point => {}
+            ModelLightKind::Spot { .. } => toml.key("type", "\"spot\""),
+            ModelLightKind::Directional => toml.key("type", "\"directional\""),
+        }
+        match light.kind {
+            ModelLightKind::Directional => {
+                toml.key("direction", vector(light.direction));
+                toml.key("irradiance", color(light.intensity));
+            }
+            ModelLightKind::Point | ModelLightKind::Spot { .. } => {
+                toml.key("position", vector(light.position));
+                toml.key("intensity", color(light.intensity));
+            }
+        }
+        if let ModelLightKind::Spot { angle, blend } = light.kind {
+            toml.key("look_at", vector(light.position + light.direction));
+            toml.key("angle", number(angle.min(359.0)));
+            toml.key("blend", number(blend));
+        }
+    }
+
+    fn mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut Unique) {
+        self.toml.table("[[mesh]]");
+        if !instance.name.is_empty() {
+            self.toml.key("name", quoted(&shapes.name(&instance.name, "mesh")));
+        }
+        let base = if instance.name.is_empty() { "part" } else { &instance.name };
+        match self.naming {
+            Naming::Inside => {
+                self.toml.key("file", quoted(&file_name(self.path)));
+                self.toml.key("part", instance.part.to_string());
+            }
+            Naming::Folder(_) => {
+                let name = self.asset(Content::Part(instance.part), base, "ply");
+                self.toml.key("file", quoted(&name));
+            }
+        }
+        self.toml.key("material", quoted(material));
+        self.placement(&instance.placed.linear, instance.placed.translate);
+        if !instance.has_normals {
+            self.toml.key("smooth", "false");
+        }
+        if instance.has_colors {
+            self.toml.key("vertex_colors", "true");
+        }
+    }
+
+    /// `scale` and `translate` where these are enough, else `matrix`.
+    fn placement(&mut self, linear: &DMat3, translate: DVec3) {
+        let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
+        if *linear == DMat3::from_diagonal(scale) {
+            if scale != DVec3::ONE {
+                self.toml.key("scale", color(scale));
+            }
+            if translate != DVec3::ZERO {
+                self.toml.key("translate", vector(translate));
+            }
+            return;
+        }
+        let rows = linear.transpose();
+        let row = |axis: DVec3, last: f64| {
+            let row = list(&[axis.x, axis.y, axis.z, last].map(tidy));
+            row[1..row.len() - 1].to_owned()
+        };
+        let matrix = [(rows.x_axis, translate.x), (rows.y_axis, translate.y), (rows.z_axis, translate.z)];
+        let matrix = matrix.map(|(axis, last)| row(axis, last)).join(",  ");
+        self.toml.key("matrix", format!("[{matrix},  0, 0, 0, 1]"));
+    }
+
+    /// Name of a file in the folder, which is made if the content is new.
+    fn asset(&mut self, content: Content, wanted: &str, ending: &str) -> String {
+        if let Some(known) = self.names.get(&content) {
+            return known.clone();
+        }
+        let folder = match self.naming {
+            Naming::Inside => String::new(),
+            Naming::Folder(folder) => format!("{folder}/"),
+        };
+        let plain: String =
+            wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
+        let plain = plain.trim_matches('.').chars().take(60).collect::<String>().to_lowercase();
+        let name = format!("{folder}{}.{ending}", self.files.name(&plain, "part"));
+        self.assets.push(Asset { name: name.clone(), content });
+        self.names.insert(content, name.clone());
+        name
+    }
+}
+
+impl super::materials::Files for Writer<'_> {
+    fn toml(&mut self) -> &mut Toml {
+        &mut self.toml
+    }
+
+    fn image_name(&self, image: usize) -> String {
+        let name = self.image_names.get(image).filter(|name| !name.is_empty()).cloned();
+        let of_file = || match self.container.image(image) {
+            Ok(ImageBytes::File(path)) => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()),
+            Ok(ImageBytes::Inside(_)) | Err(_) => None,
+        };
+        name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
+    }
+
+    fn image(&mut self, image: usize) -> TextureFile {
+        self.images.insert(image);
+        let bytes = self.container.image(image);
+        match (self.naming, bytes) {
+            (Naming::Inside, Ok(ImageBytes::File(file))) if has_ending(&file) && file.is_file() => {
+                let folder = self.path.parent().unwrap_or(Path::new(""));
+                let name = file.strip_prefix(folder).unwrap_or(&file);
+                TextureFile { file: name.to_string_lossy().into_owned(), image: None }
+            }
+            // A file without an ending is known by its content, as an image inside is. One that is missing is waited for.
+            (Naming::Inside, bytes) => {
+                if let Ok(ImageBytes::File(file)) = bytes {
+                    self.companions.push(Companion { path: file, hash: None });
+                }
+                TextureFile { file: file_name(self.path), image: Some(image) }
+            }
+            (Naming::Folder(_), bytes) => {
+                let ending = match &bytes {
+                    Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
+                    Ok(ImageBytes::File(path)) => {
+                        let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+                        let start = || first_bytes(path).unwrap_or_default();
+                        if MAPS.contains(&own.as_str()) { own } else { ending(&start()).to_owned() }
+                    }
+                    Err(_) => "png".to_owned(),
+                };
+                let wanted = self.image_name(image);
+                let name = self.asset(Content::Image(image), &wanted, &ending);
+                TextureFile { file: name, image: None }
+            }
+        }
+    }
+}
+
+/// Whether a file has the ending of an image.
+fn has_ending(file: &Path) -> bool {
+    let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    MAPS.contains(&ending.as_str())
+}
+
+/// Whether a material lets all light pass everywhere.
+fn is_clear(material: &ModelMaterial) -> bool {
+    let is_clear = match &material.alpha {
+        Alpha::Opaque => false,
+        Alpha::Mask { value, cutoff } => value.factor.x < *cutoff,
+        Alpha::Blend(value) => value.factor.x == 0.0,
+    };
+    is_clear && material.glass.is_none()
+}
+
+/// Whether a material may throw light on others as a mirror does. A texture may have any number up to its factor.
+fn is_polished(material: &ModelMaterial) -> bool {
+    let is_smooth = |roughness: &Slot| roughness.texture.is_some() || roughness.factor.x < ROUGH;
+    let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
+    let is_coated = material.clearcoat.factor.x > 0.0 && is_smooth(&material.clearcoat_roughness);
+    is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)
+}
+
+/// Irradiance at normal incidence that lights may bring to the middle of a box, all of them together. Lights inside it count from
+/// a quarter of its size.
+fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
+    let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
+    let of_light = |light: &ModelLight| {
+        let luminance = f64::from(luminance(light.intensity.as_vec3()));
+        match light.kind {
+            ModelLightKind::Directional => luminance,
+            ModelLightKind::Point | ModelLightKind::Spot { .. } => {
+                let distance = light.position.distance(middle).max(size * 0.25).max(1e-12);
+                luminance / (distance * distance)
+            }
+        }
+    };
+    lights.iter().map(of_light).sum()
+}
+
+/// The first bytes of a file. `None` if it cannot be read.
+fn first_bytes(path: &Path) -> Option<[u8; 4]> {
+    let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
+    let mut start = [0; 4];
+    file.read_exact(&mut start).ok().map(|()| start)
+}
+
+/// The ending of an image by its first bytes.
+fn ending(bytes: &[u8]) -> &'static str {
+    if bytes.starts_with(b"\xff\xd8") {
+        "jpg"
+    } else if bytes.starts_with(b"RIFF") {
+        "webp"
+    } else {
+        "png"
+    }
+}
+
+/// A number without the rest that a rotation by a right angle leaves.
+fn tidy(value: f64) -> f64 {
+    if value.abs() < 1e-12 { 0.0 } else { value }
+}
+
+/// The eye of a file's camera. It looks at the depth of the model's middle.
+fn eye_of(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> Eye {
+    let size = (greatest - least).length().max(1e-12);
+    let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
+    let look_at = camera.position + camera.direction * depth;
+    let step = size.min(depth) * 1e-6;
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
+    let up = if (camera.up - DVec3::Y).length() < 1e-6 || is_level(camera) { DVec3::Y } else { camera.up };
+    Eye { position: tidy(camera.position), look_at: tidy(look_at), up }
+}
+
+/// Whether a camera looks the same with y upwards.
+fn is_level(camera: &ModelCamera) -> bool {
+    let side = camera.direction.cross(DVec3::Y);
+    side.length() > 1e-3 && camera.up.dot(side.normalize()).abs() < 1e-6 && camera.up.y > 0.0
+}

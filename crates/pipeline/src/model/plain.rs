@@ -1,0 +1,173 @@
+//! Scenes of mesh files without a scene of their own: OBJ, OFF, PLY, STL.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::frame::framed;
+use super::toml::Toml;
+use super::{
+    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
+    render,
+};
+use crate::assets::{AssetError, FileMaterial, LoadedMesh};
+use crate::control::{CancelToken, ignore_progress};
+use crate::math::DVec3;
+use crate::math::limits::LARGEST;
+use crate::scene::quoted;
+use crate::settings::{Side, UpAxis};
+use crate::stages::containers::Containers;
+use crate::world::file_is_glass;
+
+/// The axis that points upwards where the call does not say it: z in STL files, as programs for construction and printing have
+/// it, and in PLY files by Blender; else y.
+fn usual_up(path: &Path) -> UpAxis {
+    let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    if has("stl") || has("ply") && is_by_blender(path) { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// Whether the header of a PLY file names Blender, which leaves its axes as they are.
+fn is_by_blender(path: &Path) -> bool {
+    const START: usize = 256;
+    let mut start = [0; START];
+    let read = File::open(path).and_then(|mut file| file.read(&mut start)).unwrap_or_default();
+    let lines = start[..read].split(|byte| *byte == b'\n');
+    lines
+        .filter(|line| line.starts_with(b"comment"))
+        .any(|line| line.windows(7).any(|word| word == b"Blender"))
+}
+
+impl UpAxis {
+    /// Degrees about x, y and z that turn the axis upwards. `None` if it is already.
+    fn rotation(self) -> Option<[i32; 3]> {
+        match self {
+            Self::X => Some([0, 0, 90]),
+            Self::Y => None,
+            Self::Z => Some([-90, 0, 0]),
+        }
+    }
+
+    /// A point after this rotation.
+    fn upright(self, at: DVec3) -> DVec3 {
+        match self {
+            Self::X => DVec3::new(-at.y, at.x, at.z),
+            Self::Y => at,
+            Self::Z => DVec3::new(at.x, at.z, -at.y),
+        }
+    }
+}
+
+/// Whether a material of a mesh file may throw light on others as a mirror does.
+fn is_polished(material: &FileMaterial) -> bool {
+    let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
+    match &material.physical {
+        Some(own) => {
+            let is_smooth = own.roughness_texture.is_some() || f64::from(own.roughness) < ROUGH;
+            let is_coated = own.clearcoat > 0.0 && f64::from(own.clearcoat_roughness) < ROUGH;
+            is_mirror_or_glass || is_smooth || is_coated
+        }
+        None => {
+            let reflects = material.specular_texture.is_some() || material.specular.max_element() > 0.0;
+            is_mirror_or_glass || reflects && material.shininess > NARROW
+        }
+    }
+}
+
+/// Whether every face has a material that lets all light pass.
+fn is_unseen(loaded: &LoadedMesh) -> bool {
+    let is_clear =
+        |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !file_is_glass(own);
+    let is_unseen = |index: &u32| loaded.materials.get(*index as usize).is_some_and(is_clear);
+    !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_unseen)
+}
+
+/// The scene of a mesh file.
+pub(super) fn text(
+    path: &Path,
+    show: Show,
+    containers: &Containers,
+    token: &CancelToken,
+) -> Result<ModelText, AssetError> {
+    let loaded = containers.mesh((path, None), &ignore_progress, token)?;
+    let Some([least, greatest]) = loaded.mesh.bounds() else {
+        return Err(AssetError::Malformed {
+            path: path.to_owned(),
+            line: None,
+            reason: "no usable face".to_owned(),
+        });
+    };
+    let up = show.up.unwrap_or_else(|| usual_up(path));
+    let upright = |at: DVec3| up.upright(at);
+    let (a, b) = (upright(least), upright(greatest));
+    let bounds = [a.min(b), a.max(b)];
+    let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
+    let eye = framed(
+        bounds,
+        &points,
+        (show.from.unwrap_or(Side::Iso), show.turns),
+        show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
+    );
+    // Name the coordinates of the file, not those of a camera that nobody wrote.
+    let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
+    if eye_reach >= LARGEST {
+        let farthest = least.abs().max(greatest.abs()).max_element() as f32;
+        let reason = format!(
+            "its coordinates reach to {farthest:e}, so that its camera would reach to {eye_reach:.0e}: it must stay below {LARGEST:e}"
+        );
+        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+    }
+    let (mut toml, mut names) = (Toml::default(), Unique::default());
+    toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
+    let lighting = Lighting::Ours { is_polished: loaded.materials.iter().any(is_polished) };
+    render(&mut toml, None, lighting);
+    camera(&mut toml, &eye, FOV);
+    light(&mut toml, &eye, lighting);
+    let is_colored = !loaded.mesh.colors.is_empty();
+    let needs_material = loaded.lacks_materials();
+    let name = names.name("model", "model");
+    if needs_material {
+        toml.table(&format!("[materials.{name}]"));
+        toml.key("type", "\"principled\"");
+        toml.key("color", if is_colored { "1" } else { "[0.7, 0.68, 0.64]" });
+    }
+    toml.table("[[mesh]]");
+    toml.key("file", quoted(&file_name(path)));
+    if let Some([x, y, z]) = up.rotation() {
+        toml.key("rotate", format!("[{x}, {y}, {z}]"));
+    }
+    // Facets have no normals, and edges of parts are sharp.
+    let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
+    if is_stl || loaded.is_faceted() {
+        toml.key("smooth", "false");
+    }
+    if needs_material {
+        toml.key("material", format!("\"{name}\""));
+    }
+    if is_colored {
+        toml.key("vertex_colors", "true");
+    }
+    ground(&mut toml, &mut names, bounds, &eye);
+    // The scene gives the mesh another material where the file's own are missing, and would say nothing of that.
+    let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
+    notes.extend(is_unseen(&loaded).then(|| UNSEEN.to_owned()));
+    let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
+    containers.keep(path, loaded);
+    Ok(ModelText { text: toml.finish(), hash, companions, notes, assets })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::transform::rotation_xyz;
+
+    #[test]
+    fn an_axis_is_turned_upwards_by_the_rotation_that_the_scene_has() {
+        for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
+            let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
+            assert_eq!(up.upright(axis), DVec3::Y, "{up:?}");
+            for at in [axis, DVec3::new(1.0, 2.0, 3.0)] {
+                assert_eq!(rotation * at, up.upright(at), "{up:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,499 @@
+//! From a scene and what the command line changes of it to the settings that hold.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::settings::{Checkpoints, Effective, Layer, Overrides, Side, UpAxis, View};
+use super::turntable::{self, Turn};
+use crate::choice::Choice;
+use crate::film::range_map::{DataKind, RangeMap};
+use crate::film::tone::ToneMapping;
+use crate::film::{Quantity, Rect};
+use crate::integrators::{AovSource, FirstHit, LightAov, PhotonSettings, RenderSettings};
+use crate::math::Vec3;
+use crate::output::MovingFormat;
+use crate::output::{BitDepth, Format, OutputError};
+use crate::scene::description::{Accel, Photons, Scene, Tonemap};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+
+/// Everything that a request's later stages go by.
+#[derive(Clone, Debug)]
+pub(super) struct Plan {
+    /// The scene file, or the model.
+    pub(super) path: PathBuf,
+    /// Its file name, for parts to carry.
+    pub(super) name: String,
+    /// The scene; where the overrides ask for it, with another acceleration structure. All other overrides are in the
+    /// settings.
+    pub(super) scene: Arc<Scene>,
+    pub(super) settings: RenderSettings,
+    pub(super) threads: usize,
+    pub(super) crop: Option<Rect>,
+    pub(super) time_seconds: Option<f64>,
+    pub(super) tone: ToneMapping,
+    pub(super) bit_depth: u8,
+    /// Files of this picture.
+    pub(super) outputs: Vec<PathBuf>,
+    /// Files of the moving pictures that it is a frame of.
+    pub(super) moving: Vec<PathBuf>,
+    /// The picture of a turntable that it is. `None` for a single picture.
+    pub(super) turn: Option<Turn>,
+    /// Layers beside the picture in EXR files.
+    pub(super) layers: Vec<Layer>,
+    /// The side from which a model is seen, and its axis that points upwards, where the call names them.
+    pub(super) from: Option<Side>,
+    pub(super) up: Option<UpAxis>,
+    /// Files of the other pictures of the turntable, still to come.
+    pub(super) to_come: Vec<PathBuf>,
+    pub(super) named_by: NamedBy,
+    /// The name of a turntable's pictures that nobody named, with `#` for their numbers. `None` otherwise.
+    pub(super) usual_names: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
+    pub(super) replaces_foreign: bool,
+    /// The part of the picture that is rendered, from 1, and the number of parts.
+    pub(super) shard: Option<(u32, u32)>,
+    pub(super) checkpoints: Checkpoints,
+    /// Most bytes that the render may need.
+    pub(super) memory: Option<u64>,
+    pub(super) effective: Effective,
+}
+
+/// Source of the picture's file names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NamedBy {
+    /// `-o`.
+    Call,
+    /// `output` in `[render]`.
+    Scene,
+    /// Nobody: the scene's name with `.png`.
+    Nobody,
+}
+
+/// Put scene and overrides together.
+///
+/// # Errors
+/// A crop outside the picture, or a file that cannot hold it.
+pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
+    let mut render = overrides.applied(&scene.render);
+    if scene.environment.is_some() {
+        render.background = Vec3::ZERO;
+    }
+    check_crop(overrides.crop, render.width, render.height)?;
+    let aperture = scene.camera.aperture();
+    let settings = RenderSettings {
+        render,
+        dof: overrides.dof != Some(false) && aperture > 0.0,
+        view: overrides.view.unwrap_or(View::Beauty),
+        photons: overrides
+            .photons
+            .unwrap_or(scene.photons.enabled)
+            .then(|| photons(&scene.photons, (render.width, render.height))),
+    };
+    let threads = threads(overrides);
+    let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
+    let is_usual = named_by == NamedBy::Nobody && overrides.turn.is_some();
+    let usual_names = outputs.first().filter(|_| is_usual).cloned();
+    let Outputs { outputs, moving, to_come } = Outputs::of(outputs, overrides.turn);
+    let bit_depth = overrides.bit_depth.unwrap_or(8);
+    match overrides.shard {
+        // A part has no format of pictures.
+        Some(_) => check_shard(&settings, overrides)?,
+        None => {
+            let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
+            outputs.iter().try_for_each(check)?;
+            check_layers(&outputs, &moving, settings.view, overrides)?;
+            moving
+                .iter()
+                .try_for_each(|path| check_moving(path, (render.width, render.height), bit_depth))?;
+        }
+    }
+    Ok(Plan {
+        path: path.to_owned(),
+        name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        settings,
+        threads,
+        crop: overrides.crop,
+        time_seconds: overrides.time_seconds,
+        tone: tone(render.exposure, render.tonemap, settings.view),
+        bit_depth,
+        effective: Effective::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
+        outputs,
+        moving,
+        to_come,
+        turn: overrides.turn,
+        layers: overrides.layers.clone(),
+        from: overrides.from,
+        up: overrides.up,
+        named_by,
+        usual_names,
+        report: report(overrides),
+        replaces_foreign: overrides.replaces_foreign,
+        shard: overrides.shard,
+        checkpoints: overrides.checkpoints,
+        memory: overrides.memory,
+        scene: with_accel(scene, render.accel),
+    })
+}
+
+/// Photons that a pass may send: what it stores must have room.
+pub(super) const MOST_PHOTONS: u64 = 4_000_000;
+
+/// Photons of a pass where the scene leaves their number open: as many as the picture has pixels, within these bounds. Fewer leave more
+/// error than they save time, and more take time in which another pass brings more; the first picture waits for the first pass.
+const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
+
+/// Returns the photon settings for a picture of a size, in pixels.
+fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
+    let Photons { enabled: _, count, radius, bounces } = *requested;
+    let by_pixels = || {
+        let pixels = u64::from(width) * u64::from(height);
+        pixels.clamp(*PHOTONS_BY_PIXELS.start(), *PHOTONS_BY_PIXELS.end())
+    };
+    let count = if count == 0 { by_pixels() } else { count.min(MOST_PHOTONS) };
+    PhotonSettings { count: count as u32, radius: radius as f32, bounces }
+}
+
+/// The scene with this acceleration structure. A scene may be large: it is copied only if the structure is another one.
+fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
+    let mut scene = Arc::clone(scene);
+    if scene.render.accel != accel {
+        Arc::make_mut(&mut scene).render.accel = accel;
+    }
+    scene
+}
+
+/// The command line's files, else the scene's, else the scene's name with `.png` in the working directory.
+fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (Vec<PathBuf>, NamedBy) {
+    if !overrides.outputs.is_empty() {
+        return (overrides.outputs.clone(), NamedBy::Call);
+    }
+    if let Some(of_scene) = of_scene {
+        return match overrides.turn {
+            None => (vec![of_scene.clone()], NamedBy::Scene),
+            // The scene names one picture: nobody has named those of a turntable.
+            Some(_) => (vec![turntable::suggested(of_scene)], NamedBy::Nobody),
+        };
+    }
+    let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
+    name.push(".png");
+    let name = PathBuf::from(name);
+    (vec![if overrides.turn.is_some() { turntable::suggested(&name) } else { name }], NamedBy::Nobody)
+}
+
+/// The file of the report: in a turntable one with the picture's number.
+fn report(overrides: &Overrides) -> Option<PathBuf> {
+    let path = overrides.report.as_ref()?;
+    let numbered = overrides.turn.and_then(|turn| turntable::numbered(path, turn));
+    Some(numbered.unwrap_or_else(|| path.clone()))
+}
+
+/// Files of a request, by what they hold.
+struct Outputs {
+    outputs: Vec<PathBuf>,
+    moving: Vec<PathBuf>,
+    to_come: Vec<PathBuf>,
+}
+
+impl Outputs {
+    fn of(paths: Vec<PathBuf>, turn: Option<Turn>) -> Self {
+        let (mut moving, mut to_come) = (Vec::new(), Vec::new());
+        let Some(turn) = turn else { return Self { outputs: paths, moving, to_come } };
+        let mut outputs = Vec::new();
+        for path in paths {
+            if MovingFormat::of(&path).is_some() {
+                moving.push(path);
+                continue;
+            }
+            // The other files are named with the first one, so that nothing is found in their way when hours of work are done.
+            let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
+            let of = |number| turntable::numbered(&path, Turn { number, ..turn });
+            to_come.extend(others.filter_map(of));
+            outputs.push(of(turn.number).unwrap_or(path));
+        }
+        Self { outputs, moving, to_come }
+    }
+}
+
+/// Whether there is a file for the layers that the call asks for.
+fn check_layers(
+    outputs: &[PathBuf],
+    moving: &[PathBuf],
+    view: View,
+    overrides: &Overrides,
+) -> Result<(), Box<Diagnostic>> {
+    if overrides.layers.is_empty() {
+        return Ok(());
+    }
+    let refused = |message: String, help: &str| {
+        let (severity, path, help) = (Severity::Error, PathBuf::new(), Some(help.to_owned()));
+        Err(Box::new(Diagnostic { severity, message, path, place: None, help }))
+    };
+    let is_exr = |path: &&PathBuf| Format::of(path).is_ok_and(|format| format == Format::Exr);
+    if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
+        let message = format!("--layers is for EXR files, and {} is none", other.display());
+        return refused(message, "write them to a file of their own, as in -o layers.exr");
+    }
+    if view != View::Beauty {
+        let message = format!("--layers goes with the view beauty, not with {}", view.name());
+        return refused(message, "leave out --view, or name the view as a layer");
+    }
+    Ok(())
+}
+
+/// Whether a moving picture can be made of such pictures.
+fn check_moving(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+    let Some(format) = MovingFormat::of(path) else { return Ok(()) };
+    let message = match format.check_size(size.0, size.1) {
+        Err(error) => error.to_string(),
+        Ok(()) if bit_depth != 8 => format!("a moving {format} file has 8 bits a channel"),
+        Ok(()) => return Ok(()),
+    };
+    let help = Some("write a file each, as in a_####.png".to_owned());
+    Err(Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place: None, help }))
+}
+
+fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Diagnostic>> {
+    let inside = |rect: Rect| {
+        rect.area() > 0
+            && rect.x.checked_add(rect.width).is_some_and(|right| right <= width)
+            && rect.y.checked_add(rect.height).is_some_and(|bottom| bottom <= height)
+    };
+    match crop {
+        Some(rect) if !inside(rect) => Err(Box::new(Diagnostic {
+            severity: Severity::Error,
+            message: format!(
+                "--crop {},{},{},{} does not lie inside the picture of {width}×{height} pixels",
+                rect.x, rect.y, rect.width, rect.height
+            ),
+            path: PathBuf::new(),
+            place: None,
+            help: Some("X,Y,W,H are the left and top pixel, the width and the height".to_owned()),
+        })),
+        _ => Ok(()),
+    }
+}
+
+/// Whether a picture with these settings can be divided, and whether it is known where the part goes.
+fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
+    let refused = |message: &str, help: &str| {
+        let (message, help) = (message.to_owned(), Some(help.to_owned()));
+        Err(Box::new(Diagnostic {
+            severity: Severity::Error,
+            message,
+            path: PathBuf::new(),
+            place: None,
+            help,
+        }))
+    };
+    if overrides.outputs.len() != 1 {
+        return refused(
+            "--shard writes one part, and -o must name its file",
+            "name it, as in -o night.1.part",
+        );
+    }
+    if overrides.time_seconds.is_some() {
+        return refused(
+            "--shard and --time exclude each other: machines differ in speed",
+            "give --samples or --error",
+        );
+    }
+    if settings.gathers() && settings.render.error > 0.0 {
+        let message =
+            "--shard cannot divide photons with a noise threshold: each pass needs the whole picture";
+        return refused(message, "give --error 0 and --samples, or --photons off");
+    }
+    if settings.gathers() && settings.view.source() == AovSource::Film(Quantity::Error) {
+        return refused(
+            "--shard cannot divide the view `error` of photons",
+            "render it in one, or with --photons off",
+        );
+    }
+    Ok(())
+}
+
+/// Whether a file of this ending can hold such a picture.
+fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+    let check = || Format::of(path)?.check_picture(size.0, size.1, BitDepth::try_from(bit_depth)?);
+    check().map_err(|error: OutputError| {
+        let (severity, message) = (Severity::Error, error.to_string());
+        Box::new(Diagnostic { severity, message, path: path.to_owned(), place: None, help: None })
+    })
+}
+
+/// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
+fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
+    match view.source() {
+        AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
+            ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
+        }
+        AovSource::FirstHit(FirstHit::Depth) => {
+            ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
+        }
+        AovSource::Light(LightAov::TraversalCost)
+        | AovSource::FirstHit(FirstHit::Photons)
+        | AovSource::Film(Quantity::Samples | Quantity::Error) => {
+            ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
+        }
+        AovSource::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
+            ToneMapping::DATA
+        }
+        // It is linear, but no exposure makes it more than it is.
+        AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
+    }
+}
+
+/// Threads that this machine runs at once.
+pub(super) fn threads(overrides: &Overrides) -> usize {
+    overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores)
+}
+
+pub(super) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::choice::Choice;
+    use crate::output::Format;
+    use crate::scene::description::Shadows;
+    use crate::tests::loaded_of;
+
+    fn planned(text: &str, overrides: &Overrides) -> Plan {
+        plan(&loaded_of(text).scene, Path::new("scenes/my.scene.toml"), overrides).expect("a plan")
+    }
+
+    #[test]
+    fn the_command_line_wins_over_the_scene_and_the_scene_over_defaults() {
+        let text = "[render]\nwidth = 32\nheight = 24\nsamples = 4\n";
+        let size = |plan: &Plan| {
+            let render = &plan.settings.render;
+            (render.width, render.height, render.samples)
+        };
+        let given = planned(text, &Overrides::default());
+        assert_eq!(size(&given), (32, 24, 4));
+        let overrides = Overrides {
+            width: Some(8),
+            samples: Some(2),
+            threads: Some(3),
+            seed: Some(9),
+            ..Default::default()
+        };
+        let changed = planned(text, &overrides);
+        assert_eq!(size(&changed), (8, 24, 2));
+        assert_eq!((changed.threads, changed.settings.render.seed, changed.effective.width), (3, 9, 8));
+    }
+
+    #[test]
+    fn photons_are_as_many_as_pixels_within_bounds_unless_the_scene_says_how_many() {
+        let count = |table: &str, width, height, crop| {
+            let overrides =
+                Overrides { width: Some(width), height: Some(height), crop, ..Default::default() };
+            let text = format!("[photons]\nenabled = true\n{table}");
+            planned(&text, &overrides).settings.photons.expect("they are on").count
+        };
+        let part = Some(Rect { x: 7, y: 9, width: 5, height: 3 });
+        for (table, width, height, photons) in [
+            ("", 320, 240, 76_800),
+            ("count = 0", 320, 240, 76_800),
+            ("", 16, 16, 8192),
+            ("", 1920, 1080, 200_000),
+            ("count = 500", 320, 240, 500),
+            ("count = 9_000_000", 320, 240, MOST_PHOTONS as u32),
+        ] {
+            assert_eq!(count(table, width, height, None), photons, "{table} at {width}×{height}");
+            assert_eq!(count(table, width, height, part), photons, "whatever part is rendered");
+        }
+    }
+
+    #[test]
+    fn a_scene_is_shared_whatever_is_overridden() {
+        let scene = loaded_of("").scene;
+        let overrides = Overrides { width: Some(8), shadows: Some(Shadows::Off), ..Default::default() };
+        let planned = plan(&scene, Path::new("a.toml"), &overrides).expect("a plan");
+        assert!(Arc::ptr_eq(&planned.scene, &scene));
+    }
+
+    #[test]
+    fn the_default_output_is_the_scenes_name_in_the_working_directory() {
+        assert_eq!(planned("", &Overrides::default()).outputs, [PathBuf::from("my.scene.png")]);
+        let scene = "[render]\noutput = \"a/b.exr\"\n";
+        let of_scene = planned(scene, &Overrides::default()).outputs;
+        assert!(of_scene.len() == 1 && of_scene[0].is_absolute() && of_scene[0].ends_with("a/b.exr"));
+        let overrides = Overrides { outputs: vec!["x.png".into(), "y.exr".into()], ..Default::default() };
+        assert_eq!(planned(scene, &overrides).outputs, overrides.outputs);
+    }
+
+    /// Neither room may know the other, so each has its list.
+    #[test]
+    fn a_scene_may_name_every_format_that_can_be_written_and_no_other() {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("scene.toml");
+        let load = |ending: &str| {
+            let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
+            std::fs::write(&path, format!("[render]\noutput = \"a.{ending}\"\n{camera}")).expect("written");
+            crate::scene::load(&path, &[])
+        };
+        for ending in Format::endings() {
+            assert!(load(ending).is_ok(), "{ending}");
+        }
+        let wrong = format!("{:?}", load("xyz").expect_err("no format"));
+        let offered = wrong.split(|c: char| !c.is_alphanumeric()).collect::<std::collections::HashSet<_>>();
+        for ending in ["png", "exr", "hdr", "jpg", "jpeg", "ppm", "webp", "tga", "bmp"] {
+            assert_eq!(
+                offered.contains(ending),
+                Format::endings().any(|known| known == ending),
+                "{ending}: {wrong}"
+            );
+        }
+    }
+
+    #[test]
+    fn depth_of_field_needs_an_aperture() {
+        let on = Overrides { dof: Some(true), ..Default::default() };
+        assert!(!planned("", &on).effective.dof);
+        let lens = "[camera]\naperture = 0.1\n";
+        assert!(planned(lens, &Overrides::default()).effective.dof);
+        assert!(!planned(lens, &Overrides { dof: Some(false), ..Default::default() }).settings.dof);
+    }
+
+    #[test]
+    fn a_crop_must_lie_inside() {
+        let text = "[render]\nwidth = 32\nheight = 24\n";
+        let with = |x, y, width, height| Overrides {
+            crop: Some(Rect { x, y, width, height }),
+            ..Default::default()
+        };
+        let path = Path::new("a.toml");
+        let scene = loaded_of(text).scene;
+        assert!(plan(&scene, path, &with(31, 23, 1, 1)).is_ok());
+        for outside in [with(31, 23, 2, 1), with(0, 0, 0, 1), with(u32::MAX, 0, 2, 2)] {
+            let wrong = plan(&scene, path, &outside).expect_err("outside");
+            assert!(wrong.message.contains("32×24"), "{}", wrong.message);
+        }
+    }
+
+    #[test]
+    fn exposure_is_for_light_only() {
+        let text = "[render]\nexposure = 2.0\n";
+        assert_eq!(planned(text, &Overrides::default()).tone.exposure_stops, 2.0);
+        let normals = Overrides { view: Some(View::Normal), ..Default::default() };
+        assert_eq!(planned(text, &normals).tone.exposure_stops, 0.0);
+    }
+
+    #[test]
+    fn only_display_values_skip_the_srgb_curve() {
+        use crate::film::tone::Transfer;
+        for &view in View::ALL {
+            let overrides = Overrides { view: Some(view), ..Default::default() };
+            let transfer = planned("", &overrides).tone.transfer;
+            let is_display_value = match view.source() {
+                AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
+                AovSource::Film(quantity) => quantity != Quantity::Radiance,
+                AovSource::Light(LightAov::Radiance(_) | LightAov::LitFraction) | AovSource::Bounds => false,
+            };
+            assert_eq!(transfer == Transfer::Identity, is_display_value, "{}", view.name());
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! First pictures: one sample for each pixel of the preview, shown before the first pass is done.
+
+use std::cell::Cell;
+use std::time::{Duration, Instant};
+
+use super::preview::Screen;
+use crate::film::range_map::RangeMap;
+use crate::film::{RadianceImage, Rect};
+use crate::integrators::{PhotonMaps, RenderSettings};
+use crate::plan::Plan;
+use crate::scene::description::Render;
+use crate::stages::Stop;
+use crate::trace::{Job, Tracer};
+
+/// Time for the first picture of a moved camera.
+const HASTE: Duration = Duration::from_millis(6);
+
+/// Inputs of first pictures.
+#[derive(Clone, Copy)]
+pub(crate) struct FirstPictures<'a> {
+    pub(crate) tracer: Tracer<'a>,
+    pub(crate) plan: &'a Plan,
+    /// Whether somebody is moving the camera.
+    pub(crate) is_moved: bool,
+    /// Pixels of first pictures that are traced in a second, as the last one was.
+    pub(crate) rate: &'a Cell<Option<f64>>,
+}
+
+impl<'a> FirstPictures<'a> {
+    /// Sizes of the first pictures that are much less work than one pass: about the preview's resolution, and before it a hasty
+    /// one if the camera is being moved.
+    pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
+        let usual = self.usual_size(shown);
+        let rate = self.rate.get().filter(|_| self.is_moved);
+        let hasty = rate.and_then(|rate| hasty_size(usual, rate));
+        hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
+    }
+
+    /// The preview's size; half as many pixels if the scene's trees exceed the caches, since rays are slow then.
+    fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
+        /// Triangles whose trees take some tens of megabytes.
+        const LARGE: u64 = 250_000;
+        let side =
+            |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
+        if self.tracer.world.triangle_count() < LARGE { (width, height) } else { (side(width), side(height)) }
+    }
+
+    fn is_less_work(&self, (width, height): (u32, u32)) -> bool {
+        let Render { width: full_width, height: full_height, .. } = self.plan.settings.render;
+        let pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
+        pixels(width, height) * 2 <= pixels(full_width, full_height)
+    }
+
+    /// Traces a first picture of this size; notes how many pixels are traced in a second. `tick` is called every now and then.
+    pub(crate) fn picture(
+        &self,
+        photons: Option<&PhotonMaps>,
+        (width, height): (u32, u32),
+        tick: impl Fn(),
+    ) -> Result<RadianceImage, Stop> {
+        let plan = self.plan;
+        let full = (plan.settings.render.width, plan.settings.render.height);
+        let render = Render { width, height, ..plan.settings.render };
+        let settings = RenderSettings { render, ..plan.settings };
+        let whole = Rect { x: 0, y: 0, width, height };
+        let rect = plan.crop.map_or(whole, |rect| scale(rect, full, (width, height)));
+        let tracer = Tracer { settings: &settings, photons, ..self.tracer };
+        let mut picture = RadianceImage::black(width, height);
+        let begin = Instant::now();
+        tracer.run(
+            &jobs(rect),
+            |_, piece| piece,
+            |result| {
+                if let Some((_, piece, _)) = result {
+                    picture.put(piece.pixels.rect, &piece.radiance);
+                }
+                tick();
+                true
+            },
+        )?;
+        let rate = rect.area() as f64 / begin.elapsed().as_secs_f64().max(1e-6);
+        self.rate.set(Some(rate));
+        Ok(picture)
+    }
+
+    /// Shows a first picture without the light of photons, which are yet to be traced: where the whole picture is shown, and
+    /// tracing it once is much less work than one pass. The film gets nothing of it. `tick` is called every now and then.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub(crate) fn show_without_photons(&self, screen: Screen<'_>, tick: impl Fn()) -> Result<(), Stop> {
+        let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
+        // Views of numbers are stretched, and one of them is of the photons themselves.
+        let is_of_light = self.plan.tone.range_map == RangeMap::None;
+        let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
+        let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
+        let picture = self.picture(None, size, tick)?;
+        screen.show_without_photons(&picture.resized(shown.0, shown.1));
+        Ok(())
+    }
+}
+
+/// Size of a first picture that takes [`HASTE`] at this rate of pixels a second. `None` if the usual picture takes hardly longer.
+fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
+    /// Pixels across of the smallest.
+    const LEAST: f64 = 16.0;
+    let share = (rate * HASTE.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
+    let side =
+        |length: u32| ((f64::from(length) * share.max(LEAST / f64::from(width))).round() as u32).max(1);
+    (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
+}
+
+/// Small pieces, so that all threads end at about the same time.
+fn jobs(rect: Rect) -> Vec<Job> {
+    const FEW: usize = 5000;
+    let side = if rect.area() < FEW { 8 } else { 16 };
+    let starts = |start: u32, length: u32| (start..start + length).step_by(side as usize);
+    let piece = |(x, y)| Rect { x, y, width: side, height: side }.intersection(&rect);
+    let places = starts(rect.y, rect.height).flat_map(|y| starts(rect.x, rect.width).map(move |x| (x, y)));
+    let job = |(tile, rect): (usize, Rect)| Job { tile, pixels: rect.into(), samples: 0..1 };
+    places.filter_map(piece).enumerate().map(job).collect()
+}
+
+/// The pixels of a smaller picture that lie under a rectangle of a larger one.
+fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
+    let along = |start: u32, len: u32, from: u32, to: u32| {
+        let at = |pixel: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
+        let begin = (at(start) as u32).min(to - 1);
+        let end = ((u64::from(start) + u64::from(len)) * u64::from(to)).div_ceil(u64::from(from)) as u32;
+        (begin, end.clamp(begin + 1, to) - begin)
+    };
+    let (x, width) = along(rect.x, rect.width, from.0, to.0);
+    let (y, height) = along(rect.y, rect.height, from.1, to.1);
+    Rect { x, y, width, height }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pieces_of_a_coarse_picture_cover_it_once() {
+        let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
+        let mut seen = vec![0; 64 * 64];
+        for job in jobs(rect) {
+            for y in job.pixels.rect.y..job.pixels.rect.y + job.pixels.rect.height {
+                for x in job.pixels.rect.x..job.pixels.rect.x + job.pixels.rect.width {
+                    seen[(y * 64 + x) as usize] += 1;
+                }
+            }
+        }
+        let one = Rect { width: 1, height: 1, ..rect };
+        for (i, times) in (0..64 * 64).zip(seen) {
+            let is_inside = Rect { x: i % 64, y: i / 64, ..one }.intersection(&rect).is_some();
+            assert_eq!(times, i32::from(is_inside), "pixel {i}");
+        }
+    }
+
+    #[test]
+    fn a_hasty_picture_is_as_large_as_its_time_allows() {
+        let pixels_of = |rate: f64| hasty_size((120, 80), rate / HASTE.as_secs_f64());
+        assert_eq!(pixels_of(9600.0), None, "there is time for the usual one");
+        assert_eq!(pixels_of(2400.0), Some((60, 40)));
+        assert_eq!(pixels_of(1.0), Some((16, 11)), "one that still shows something");
+        assert_eq!(hasty_size((10, 5), 0.0), Some((10, 5)));
+    }
+
+    #[test]
+    fn a_crop_covers_its_part_of_a_smaller_picture() {
+        let rect = Rect { x: 10, y: 30, width: 5, height: 10 };
+        assert_eq!(scale(rect, (100, 100), (10, 10)), Rect { x: 1, y: 3, width: 1, height: 1 });
+        let last = Rect { x: 99, y: 99, width: 1, height: 1 };
+        assert_eq!(scale(last, (100, 100), (3, 3)), Rect { x: 2, y: 2, width: 1, height: 1 });
+    }
+}

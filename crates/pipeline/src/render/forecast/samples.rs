@@ -1,0 +1,197 @@
+//! The samples that each part of the picture will need for the error asked for, before its goal is decided.
+
+use crate::film::{CELLS, Convergence, samples_to_reduce_error};
+use crate::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
+
+/// Fall of the variance from two to four samples and from four to eight, if nothing is known. In the bundled scenes half of the
+/// tiles fall faster, half slower.
+const EARLY_FALL: f64 = 4.0;
+/// Between which it is believed.
+const FALLS: [f64; 2] = [2.0, 8.0];
+
+/// Samples that the halves of each cell are expected to get.
+#[derive(Debug)]
+pub(crate) struct ExpectedSamples(Vec<[u32; 2]>);
+
+impl ExpectedSamples {
+    /// For so many cells, of which nothing is known.
+    pub(crate) fn unknown(cells: usize) -> Self {
+        Self(vec![[u32::MAX; 2]; cells])
+    }
+
+    /// Samples that a half of a cell without a goal is expected to get; [`u32::MAX`] where nothing is known.
+    pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
+        self.0[cell][half]
+    }
+
+    /// Bytes of all of them.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        size_of_val(self.0.as_slice())
+    }
+
+    /// Predicts from a judgement, whose samples are a power of two: by the noise of both halves of a tile, and by its fall.
+    /// `done` are the samples of all halves. Halves with a goal keep their prediction.
+    pub(crate) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
+        let Judgement { noise, samples, aim } = judgement;
+        // Take the tiles without goals, and how fast the noise of all of them falls.
+        let open = |(tile, noise): (usize, &Option<TileNoise>)| {
+            noise.filter(|_| goals.is_open(tile, done, *samples)).map(|noise| (tile, noise))
+        };
+        let tiles: Vec<(usize, TileNoise)> = noise.iter().enumerate().filter_map(open).collect();
+        let falls = tiles.iter().filter_map(|(_, noise)| noise.fall).collect();
+        let law = NoiseFall::of(aim.convergence, falls, *samples);
+        for (tile, TileNoise { halves, fall }) in tiles {
+            // Average the noise of the tile's halves.
+            let squares = halves.iter().flatten().map(|half| {
+                let noise = aim.relative(half);
+                noise * noise
+            });
+            let mean = squares.sum::<f64>() / halves.iter().flatten().count() as f64;
+            if !mean.is_finite() {
+                continue;
+            }
+            // Follow its fall down to the error asked for.
+            let wanted = law.samples_to(AIM * aim.error, mean.sqrt(), fall);
+            let cells = self.0.iter_mut().zip(done).enumerate().skip(CELLS * tile).take(CELLS);
+            for (cell, (expected, done)) in cells {
+                for half in (0..2).filter(|half| goals.of(cell, *half) == u32::MAX) {
+                    expected[half] = wanted.max(done[half]).max(LEAST);
+                }
+            }
+        }
+    }
+}
+
+/// Expected fall of noise from some samples on. Smooth parts fall fast and are below any bound soon. The rest falls as noise at
+/// edges and in penumbras does, or slower.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct NoiseFall {
+    samples: u32,
+    /// Doublings of these by each of which the variance falls by `fall`; after them it falls with `power`.
+    doublings: u32,
+    /// Ratio of the tiles' variances before and after the last doubling. `None` below [`LEAST`] samples, where each tile's own
+    /// fall counts.
+    fall: Option<f64>,
+    /// The power of the samples with which variance falls later.
+    power: f64,
+}
+
+impl NoiseFall {
+    /// The law that fits the tiles' ratios of variance before and after their last doubling.
+    fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
+        let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
+        if convergence == Convergence::Photons {
+            return Self {
+                samples,
+                doublings,
+                fall: Some(libm::exp2(convergence.usual_power())),
+                power: convergence.usual_power(),
+            };
+        }
+        if samples < LEAST {
+            return Self { samples, doublings, fall: None, power: convergence.usual_power() };
+        }
+        falls.sort_by(f64::total_cmp);
+        let usual = libm::exp2(convergence.usual_power());
+        let fall = falls.get(falls.len() / 2).map_or(usual, |fall| fall.clamp(FALLS[0], FALLS[1]));
+        Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
+    }
+
+    /// Samples that bring the noise of a tile to a bound, where its variance fell so by its last doubling.
+    fn samples_to(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
+        let of_tile = || {
+            // Of the falls from two samples on, one more is known by each doubling.
+            let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
+            let fall = fall.map_or(EARLY_FALL, |fall| fall.clamp(FALLS[0], FALLS[1]));
+            libm::pow(fall, known) * libm::pow(EARLY_FALL, 1.0 - known)
+        };
+        let fall = self.fall.unwrap_or_else(of_tile);
+        let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
+        let samples = self.samples.saturating_mul(1 << self.doublings);
+        if noise > 0.0 {
+            samples_to_reduce_error(self.power, bound / noise, samples).min(MOST)
+        } else {
+            self.samples
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::noise_goals::tests::film;
+
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> (Goals, ExpectedSamples) {
+        let (mut goals, mut expected) = (Goals::none(1), ExpectedSamples::unknown(1));
+        let done = [[samples; 2]];
+        let judgement = goals.judge(&film(halves, samples), &done, samples, error).expect("samples");
+        expected.predict(&judgement, &goals, &done);
+        (goals, expected)
+    }
+
+    #[test]
+    fn the_noise_of_both_halves_tells_how_many_samples_there_will_be() {
+        // The first half is smooth, the other one is not.
+        let (goals, expected) = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
+        assert!((64..1000).contains(&expected.of(0, 0)), "{}", expected.of(0, 0));
+    }
+
+    #[test]
+    fn a_few_samples_tell_how_many_there_will_be() {
+        // Independent samples of a standard deviation of √(1/12) take 833. Two of them do not tell that their noise falls slowly, each
+        // doubling tells more of it: 80, 190 and 260 by steps of the size to be expected, which 64 pixels tell to about a fifth.
+        for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
+            let (goals, expected_samples) = judged([(1.0, 1.0); 2], samples, 0.01);
+            assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
+            let ratio = f64::from(expected_samples.of(0, 0)) / expected;
+            assert!((0.6..1.6).contains(&ratio), "{samples}: {}", expected_samples.of(0, 0));
+        }
+    }
+
+    #[test]
+    fn how_noise_fell_of_late_tells_how_it_will_fall() {
+        let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
+        let of = |falls: &[f64]| NoiseFall::of(stratified, falls.to_vec(), 64);
+        for (falls, fall, power) in [
+            (vec![], libm::exp2(usual), usual),
+            (vec![2.0, 1.0, 2.0], 2.0, 1.0),
+            (vec![9.0, 4.0, 3.0], 4.0, usual),
+            (vec![100.0, 2.2, 2.3, 2.1, 1e-3], 2.2, libm::log2(2.2)),
+        ] {
+            assert_eq!(
+                of(&falls),
+                NoiseFall { samples: 64, doublings: 1, fall: Some(fall), power },
+                "{falls:?}"
+            );
+        }
+        // Half of the noise of 64 samples, which falls by 4 and then by 2.7 at each doubling; which is nothing but that of chance.
+        let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
+        assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
+        assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
+        assert!(near(of(&[1.0]).samples_to(0.25, 1.0, None), 16.0 * 64.0));
+        assert!(near(
+            NoiseFall::of(Convergence::Photons, vec![9.0], 4).samples_to(0.25, 1.0, Some(9.0)),
+            64.0
+        ));
+    }
+
+    #[test]
+    fn what_takes_more_samples_than_can_be_counted_is_not_taken_for_unknown() {
+        for samples in [2, 16, 64] {
+            let (goals, expected) = judged([(1.0, 1.0); 2], samples, 1e-12);
+            assert_eq!((goals.of(0, 0), expected.of(0, 0)), (u32::MAX, MOST), "{samples}");
+        }
+    }
+
+    #[test]
+    fn a_few_samples_of_what_is_smooth_tell_that_the_least_will_do() {
+        let way = NoiseFall::of(Convergence::Stratified, vec![], 4);
+        assert_eq!((way.doublings, way.fall), (2, None));
+        let [smooth, unknown, rough] =
+            [Some(8.0), None, Some(1.0)].map(|fall| way.samples_to(0.2, 1.0, fall));
+        assert!(smooth < unknown && unknown < rough, "{smooth} {unknown} {rough}");
+        // Falls of √(8 · 4) and √(2 · 4).
+        assert!((12..17).contains(&smooth) && (30..55).contains(&rough), "{smooth} {rough}");
+    }
+}

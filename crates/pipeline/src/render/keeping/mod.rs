@@ -1,0 +1,470 @@
+//! Checkpoints of a render: when they are written, what they hold beside the film, and how a render goes on from one.
+
+mod claim;
+mod state;
+
+use std::cell::{Cell, OnceCell, RefCell};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+pub(crate) use self::claim::Claim;
+use self::state::State;
+use super::film_state::FilmState;
+use super::share::Share;
+use crate::control::CancelToken;
+use crate::engine::Interruption;
+use crate::film::Film;
+use crate::inputs::Inputs;
+use crate::integrators::RayCounters;
+use crate::output::part::{
+    self, Head, Kind, PartError, PartFile, PictureHead, ShareHead, Trait, differences,
+};
+use crate::output::write::{Durability, Guard};
+use crate::output::{Finish, Losses, OutputError};
+use crate::protocol::CheckpointNews;
+use crate::settings::{Checkpoints, Resume};
+use crate::sink::Sink;
+use crate::stages::Stop;
+
+/// A checkpoint takes at most one part in so many of the time.
+const TIME_SHARE: u32 = 100;
+
+/// Ending of a checkpoint's name, behind that of the output.
+const ENDING: &str = ".checkpoint";
+
+/// The head of a film's file.
+pub(crate) fn head(kind: Kind, state: &FilmState, identity: Vec<Trait>, finish: &Finish) -> Head {
+    let share = share_head(state.share.as_ref());
+    Head { kind, identity, share, picture: PictureHead::new(&state.film, finish) }
+}
+
+fn share_head(share: Option<&Share>) -> ShareHead {
+    match share {
+        Some(share) => ShareHead {
+            index: share.index,
+            count: share.count,
+            block_count: share.block_count(),
+            blocks: share.blocks().to_vec(),
+        },
+        None => ShareHead { index: 1, count: 1, block_count: 0, blocks: Vec::new() },
+    }
+}
+
+/// Ending of a checkpoint that made way for that of another render.
+const ASIDE: &str = ".before";
+
+/// The file of an output's checkpoint.
+pub(crate) fn path_of(output: &Path) -> PathBuf {
+    let mut name = output.as_os_str().to_owned();
+    name.push(ENDING);
+    name.into()
+}
+
+/// Surroundings of a render with checkpoints.
+#[derive(Clone, Copy)]
+pub(crate) struct Around<'a> {
+    pub(crate) finish: &'a Finish,
+    pub(crate) inputs: &'a Inputs,
+    pub(crate) sink: &'a Sink,
+    /// Names of all that the picture depends on; takes a while to find out.
+    pub(crate) name: &'a dyn Fn() -> Vec<Trait>,
+    /// Why the render is cancelled.
+    pub(crate) interruption: &'a dyn Fn() -> Interruption,
+    /// Checkpoints that the process has met before.
+    pub(crate) claim: &'a RefCell<Claim>,
+}
+
+/// Checkpoints of one render.
+pub(crate) struct Keeping<'a> {
+    output: PathBuf,
+    path: PathBuf,
+    settings: Checkpoints,
+    around: Around<'a>,
+    identity: OnceCell<Vec<Trait>>,
+    due: Cell<Instant>,
+    /// Whether the checkpoint that this process holds is of this render.
+    is_own: Cell<bool>,
+}
+
+impl<'a> Keeping<'a> {
+    /// Checkpoints beside an output.
+    pub(crate) fn new(output: &Path, settings: Checkpoints, around: Around<'a>) -> Self {
+        Self {
+            output: output.to_owned(),
+            path: path_of(output),
+            settings,
+            around,
+            identity: OnceCell::new(),
+            due: Cell::new(Instant::now() + Duration::from_secs_f64(settings.seconds.min(1e9))),
+            is_own: Cell::new(false),
+        }
+    }
+
+    fn identity(&self) -> &[Trait] {
+        self.identity.get_or_init(self.around.name)
+    }
+
+    /// Brings an empty film to where the checkpoint was, if the call asks for that, or to the end, if the output is this part already.
+    /// Returns whether the film is of use: if not, the render begins with another one.
+    ///
+    /// # Errors
+    /// The call asks for a checkpoint that is of another picture, damaged, or has more samples than asked for; or for a part where
+    /// that of another render is.
+    pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, Stop> {
+        let resume = self.settings.resume;
+        let is_there = self.path.symlink_metadata().is_ok();
+        if resume == Resume::Asked && self.take_finished_part(state)? {
+            return Ok(true);
+        }
+        match resume {
+            Resume::No | Resume::IfSame if !is_there => return Ok(true),
+            Resume::Asked if !is_there => {
+                self.tell(CheckpointNews::Absent { path: self.path.clone() });
+                return Ok(true);
+            }
+            Resume::No | Resume::Asked | Resume::IfSame => {}
+        }
+        if resume != Resume::Asked && !part::is_part(&self.path) {
+            self.tell_failure(&format!("{}: the file of this name is no checkpoint", self.path.display()));
+            return Ok(true);
+        }
+        if resume == Resume::No {
+            let is_same = PartFile::head(&self.path).is_ok_and(|head| self.unlike(&head, state).is_empty());
+            if is_same {
+                self.tell(CheckpointNews::Ignored { path: self.path.clone() });
+            }
+            return Ok(true);
+        }
+        let Err(error) = self.restore(state, samples) else {
+            self.around.claim.borrow_mut().take_over(&self.path);
+            self.is_own.set(true);
+            let (path, samples) = (self.path.clone(), state.samples(samples));
+            self.tell(CheckpointNews::Resumed { path, samples });
+            return Ok(true);
+        };
+        if resume == Resume::Asked {
+            return Err(Stop::wrong_call(
+                format!("--resume: {error}"),
+                "leave --resume out to start from the beginning, or name another file with -o",
+            ));
+        }
+        if self.around.claim.borrow_mut().is_news(&self.path) {
+            self.tell(CheckpointNews::Unused { path: self.path.clone(), why: why(&error) });
+        }
+        Ok(!state.is_begun())
+    }
+
+    /// Takes the samples of a part that is finished already, if the output is one. Returns whether it is.
+    ///
+    /// # Errors
+    /// The output is a part of another render.
+    fn take_finished_part(&self, state: &mut FilmState) -> Result<bool, Stop> {
+        if state.share.is_none() || !part::is_part(&self.output) {
+            return Ok(false);
+        }
+        let path = self.output.clone();
+        let file = match PartFile::open(&self.output, &CancelToken::new()) {
+            Ok(file) if file.head.kind == Kind::Part => file,
+            // Checked before the work: no part replaces a checkpoint.
+            Ok(_) => return Ok(false),
+            Err(error) => {
+                self.tell(CheckpointNews::Unused { path, why: why(&error) });
+                return Ok(false);
+            }
+        };
+        let mut differences = self.unlike(&file.head, state);
+        if differences.is_empty() && file.head != self.head(Kind::Part, state) {
+            differences.push("the picture is finished in another way".to_owned());
+        }
+        let refused = |error: PartError| {
+            let way_out = "leave --resume out to replace it, or name another file with -o";
+            Err(Stop::wrong_call(format!("--resume: {error}"), way_out))
+        };
+        if !differences.is_empty() {
+            return refused(PartError::Other { path, other: "this call".to_owned(), differences });
+        }
+        if let Err(error) = file.restore(&state.film) {
+            return refused(error);
+        }
+        state.count_again();
+        state.is_finished_part = true;
+        self.tell(CheckpointNews::Finished { path });
+        Ok(true)
+    }
+
+    /// Moves the checkpoint of another render out of the way, unless this one has all that it has. Of several, the one that took
+    /// longest stays aside.
+    ///
+    /// # Errors
+    /// It cannot be moved, or another process holds it: the reason.
+    fn make_way(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
+        let is_held = self.around.claim.borrow().holds(&self.path);
+        if is_held && self.is_own.get() {
+            return Ok(());
+        }
+        if self.around.claim.borrow().is_of_another(&self.path) {
+            return Err(held_by_another(&self.path));
+        }
+        let Some((head, there)) = kept_in(&self.path) else {
+            return match PartFile::head(&self.path) {
+                Err(PartError::Version { .. }) => self.move_aside(|_| false),
+                Ok(head) if head.kind == Kind::Part => Err(is_finished_part(&self.path)),
+                Ok(_)
+                | Err(
+                    PartError::Unreadable { .. }
+                    | PartError::Foreign { .. }
+                    | PartError::Unfinished { .. }
+                    | PartError::Damaged { .. }
+                    | PartError::Kind { .. }
+                    | PartError::Other { .. }
+                    | PartError::Doubled { .. }
+                    | PartError::Missing { .. }
+                    | PartError::Film(_)
+                    | PartError::Cancelled(_),
+                ) => Ok(()),
+            };
+        };
+        if self.has_all_of(&head, &there, state, rays) {
+            return Ok(());
+        }
+        let is_longer =
+            |aside: &Path| kept_in(aside).is_some_and(|(_, before)| before.seconds >= there.seconds);
+        self.move_aside(is_longer)
+    }
+
+    /// Moves the checkpoint aside, unless `is_longer` prefers the one that is there.
+    ///
+    /// # Errors
+    /// It cannot be moved: the reason.
+    fn move_aside(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
+        let mut aside = self.path.as_os_str().to_owned();
+        aside.push(ASIDE);
+        let aside = PathBuf::from(aside);
+        if is_longer(&aside) {
+            return Ok(());
+        }
+        if aside.symlink_metadata().is_ok() && kept_in(&aside).is_none() {
+            return Err(format!("{} is in the way of the one that was there", aside.display()));
+        }
+        std::fs::rename(&self.path, &aside).map_err(|error| format!("{}: {error}", self.path.display()))?;
+        self.tell(CheckpointNews::SetAside { path: aside });
+        Ok(())
+    }
+
+    /// Whether a checkpoint is of this picture, and this render has traced as much as it has.
+    fn has_all_of(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
+        let has_rays = state.is_finished_part || there.camera_rays() <= rays.camera_rays;
+        self.unlike(head, state).is_empty() && has_rays
+    }
+
+    fn restore(&self, state: &mut FilmState, samples: u32) -> Result<(), PartError> {
+        let path = self.path.clone();
+        let other =
+            |differences| PartError::Other { path: path.clone(), other: "this call".to_owned(), differences };
+        let unlike = self.unlike(&PartFile::head(&self.path)?, state);
+        if !unlike.is_empty() {
+            return Err(other(unlike));
+        }
+        let file = PartFile::open(&self.path, &CancelToken::new())?;
+        file.check_kind(Kind::Checkpoint)?;
+        // Nothing is changed before all of the file has been looked at.
+        let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
+        let read: State =
+            serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state makes no sense"))?;
+        if !read.is_possible() {
+            return Err(damaged("its state has impossible numbers"));
+        }
+        if !read.fits(state) {
+            return Err(damaged("its state is that of another film"));
+        }
+        file.restore(&state.film)?;
+        read.put(state).ok_or_else(|| damaged("its state is that of another film"))?;
+        state.count_again();
+        if !state.has_at_most(samples) {
+            return Err(other(vec![format!("it has more samples than the {samples} that are asked for")]));
+        }
+        Ok(())
+    }
+
+    fn head(&self, kind: Kind, state: &FilmState) -> Head {
+        head(kind, state, self.identity().to_vec(), self.around.finish)
+    }
+
+    /// Differences between a head and this render.
+    fn unlike(&self, head: &Head, state: &FilmState) -> Vec<String> {
+        let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
+        let share = share_head(state.share.as_ref());
+        let name = |share: &ShareHead| match share.count {
+            1 => "the whole picture".to_owned(),
+            count => format!("part {}/{count}", share.index),
+        };
+        if unlike.is_empty() && head.share != share {
+            unlike.push(format!("it is of {} and this call of {}", name(&head.share), name(&share)));
+        }
+        unlike
+    }
+
+    /// Writes a checkpoint if it is time for one.
+    pub(crate) fn tick(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
+        if Instant::now() < self.due.get() {
+            return;
+        }
+        let begin = Instant::now();
+        self.write(state, rays, seconds, Durability::Power);
+        let pause = Duration::from_secs_f64(self.settings.seconds.min(1e9)).max(begin.elapsed() * TIME_SHARE);
+        self.due.set(Instant::now() + pause);
+    }
+
+    /// Writes the checkpoint of a cancelled render that is to be continued later. Returns whether it was written.
+    pub(crate) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
+        let is_kept = match (self.around.interruption)() {
+            Interruption::Replaced => false,
+            // A checkpoint that is there already is to have all that there is.
+            Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
+            Interruption::Ended => true,
+        };
+        // Whoever ended it waits: the disk may take longer than that.
+        is_kept && state.is_begun() && self.write(state, rays, seconds, Durability::Process)
+    }
+
+    /// Takes a checkpoint that this process wrote for an earlier request of this render as its own.
+    pub(crate) fn recognize(&self, state: &FilmState) {
+        let is_held = self.around.claim.borrow().holds(&self.path);
+        let is_own =
+            is_held && PartFile::head(&self.path).is_ok_and(|head| self.unlike(&head, state).is_empty());
+        self.is_own.set(is_own);
+    }
+
+    /// Removes the checkpoint of a picture that is written, or writes a last one if checkpoints are kept. If a long render's picture
+    /// could not be written, or whoever ended the process did not wait for it, its samples are kept all the same.
+    pub(crate) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
+        let was_long = state.render_seconds >= self.settings.seconds;
+        let is_ended = match (self.around.interruption)() {
+            Interruption::Ended => true,
+            Interruption::Left | Interruption::Replaced => false,
+        };
+        match (is_written, self.settings.are_kept) {
+            (false, false) if !was_long && !is_ended => return,
+            (false, _) | (true, true) => {
+                let durability = if is_ended { Durability::Process } else { Durability::Power };
+                self.write(state, rays, state.render_seconds, durability);
+                return;
+            }
+            (true, false) => {}
+        }
+        // One of another picture, of more samples, or of a process that is still there is somebody else's.
+        let is_done = |(head, there)| self.has_all_of(&head, &there, state, rays);
+        let mut claim = self.around.claim.borrow_mut();
+        let is_own = self.is_own.get() && claim.holds(&self.path);
+        if is_own || !claim.is_of_another(&self.path) && kept_in(&self.path).is_some_and(is_done) {
+            claim.release();
+            // What cannot be removed is in nobody's way.
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+
+    /// Returns whether the checkpoint was written.
+    fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) -> bool {
+        // 0 is never.
+        if self.settings.seconds <= 0.0 {
+            return false;
+        }
+        if let Err(why) = self.make_way(state, rays) {
+            self.tell_failure(&why);
+            return false;
+        }
+        let head = self.head(Kind::Checkpoint, state);
+        let written = serde_json::to_value(State::of(state, rays, seconds))
+            .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
+            .and_then(|value| self.save(&head, &state.film, &value, durability));
+        match &written {
+            Ok(()) => {
+                self.is_own.set(true);
+                self.tell(CheckpointNews::Written { path: self.path.clone() });
+            }
+            Err(error) => self.tell_failure(&error.to_string()),
+        }
+        written.is_ok()
+    }
+
+    /// Writes a checkpoint and holds it; never over something else.
+    fn save(
+        &self,
+        head: &Head,
+        film: &Film,
+        state: &serde_json::Value,
+        durability: Durability,
+    ) -> Result<(), OutputError> {
+        let (path, Around { inputs, claim, .. }) = (&self.path, self.around);
+        let may_replace = |at: &Path| {
+            let refused = |reason| Err(OutputError::Refused { reason });
+            match at.symlink_metadata() {
+                Ok(_) if !part::is_part(at) || inputs.contain(at) => refused(format!(
+                    "cannot write {}: the file of this name is no checkpoint",
+                    path.display()
+                )),
+                Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == Kind::Part) => {
+                    Err(OutputError::Refused { reason: is_finished_part(path) })
+                }
+                // Another process may have come first since the last look.
+                Ok(_) if claim.borrow().is_of_another(at) => refused(held_by_another(path)),
+                Ok(_) | Err(_) => Ok(()),
+            }
+        };
+        let guard = Guard {
+            is_kept: &|path| inputs.contain(path),
+            may_replace: &may_replace,
+            losses: Losses::Told(&|_| ()),
+        };
+        // Nobody cancels this: it is short, and a signal may be its reason.
+        let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
+        claim.borrow_mut().hold(path, file);
+        Ok(())
+    }
+
+    fn tell_failure(&self, why: &str) {
+        let Around { sink, claim, .. } = self.around;
+        if claim.borrow_mut().is_first_failure(sink.generation) {
+            self.tell(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
+        }
+    }
+
+    fn tell(&self, news: CheckpointNews) {
+        self.around.sink.checkpoint(news);
+    }
+}
+
+fn is_finished_part(path: &Path) -> String {
+    format!("{} is a finished part; name another file with -o", path.display())
+}
+
+fn held_by_another(path: &Path) -> String {
+    format!("another glimt that is running keeps {}; name another file with -o", path.display())
+}
+
+/// The reason why a file is not used, without its name.
+fn why(error: &PartError) -> String {
+    match error {
+        PartError::Other { differences, .. } => differences.join("; "),
+        PartError::Damaged { why, .. } => format!("it is damaged: {why}"),
+        PartError::Unfinished { bytes, .. } => format!("it ends at byte {bytes}, before its end"),
+        PartError::Version { found, known, .. } => {
+            format!("it has version {found} of the format, and this glimt reads version {known}")
+        }
+        PartError::Unreadable { .. }
+        | PartError::Foreign { .. }
+        | PartError::Kind { .. }
+        | PartError::Doubled { .. }
+        | PartError::Missing { .. }
+        | PartError::Film(_)
+        | PartError::Cancelled(_) => error.to_string(),
+    }
+}
+
+/// The head and the state of a whole checkpoint.
+fn kept_in(path: &Path) -> Option<(Head, State)> {
+    let file = PartFile::open(path, &CancelToken::new()).ok()?;
+    file.check_kind(Kind::Checkpoint).ok()?;
+    let state: State = serde_json::from_value(file.state).ok()?;
+    state.is_possible().then_some((file.head, state))
+}

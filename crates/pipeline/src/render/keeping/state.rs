@@ -1,0 +1,131 @@
+//! State of a render that its film does not hold.
+
+use serde::{Deserialize, Serialize};
+
+use crate::integrators::RayCounters;
+use crate::render::film_state::{Before, FilmState};
+
+/// State of a render beside its film.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct State {
+    /// Samples that the halves of each cell are to have, as far as that is decided.
+    goals: Vec<[u32; 2]>,
+    /// Samples at which each tile was judged last.
+    judged: Vec<u32>,
+    /// Brightness that noise is held against.
+    brightness: Option<f64>,
+    /// Rays of each cell.
+    cell_rays: Vec<u64>,
+    /// Camera, shadow, reflected, refracted, scattered rays; texture look-ups.
+    rays: [u64; 6],
+    /// Seconds of rendering.
+    pub(super) seconds: f64,
+    /// Seconds of a processor.
+    processor_seconds: f64,
+}
+
+impl State {
+    pub(super) fn of(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
+        let RayCounters {
+            camera_rays,
+            shadow_rays,
+            reflected_rays,
+            refracted_rays,
+            scattered_rays,
+            texture_lookups,
+        } = rays;
+        Self {
+            goals: state.goals.decided.clone(),
+            judged: state.goals.judged.clone(),
+            brightness: state.goals.brightness,
+            cell_rays: state.rays.clone(),
+            rays: [camera_rays, shadow_rays, reflected_rays, refracted_rays, scattered_rays, texture_lookups],
+            seconds,
+            processor_seconds: state.seconds,
+        }
+    }
+
+    /// Camera rays that were traced.
+    pub(super) fn camera_rays(&self) -> u64 {
+        let [camera_rays, ..] = self.rays;
+        camera_rays
+    }
+
+    /// Whether a render can have left these numbers. Others would overflow sums, or make a render wait for ever.
+    pub(super) fn is_possible(&self) -> bool {
+        /// Some 30,000 years.
+        const MOST_SECONDS: f64 = 1e12;
+        const MOST_RAYS: u64 = 1 << 56;
+        let is_time = |seconds: f64| (0.0..=MOST_SECONDS).contains(&seconds);
+        let sum = |rays: &[u64]| rays.iter().try_fold(0_u64, |sum, rays| sum.checked_add(*rays));
+        let have_rays = |rays: &[u64]| sum(rays).is_some_and(|sum| sum <= MOST_RAYS);
+        is_time(self.seconds)
+            && is_time(self.processor_seconds)
+            && self.brightness.is_none_or(|brightness| brightness.is_finite() && brightness >= 0.0)
+            && have_rays(&self.rays)
+            && have_rays(&self.cell_rays)
+    }
+
+    /// Whether it is of a film of this size.
+    pub(super) fn fits(&self, state: &FilmState) -> bool {
+        self.goals.len() == state.done.len()
+            && self.cell_rays.len() == state.done.len()
+            && self.judged.len() == state.film.tile_count()
+    }
+
+    /// Puts it into a film's state. `None`, and nothing is changed, if it is of another film.
+    pub(super) fn put(self, state: &mut FilmState) -> Option<()> {
+        if !self.fits(state) {
+            return None;
+        }
+        let [camera_rays, shadow_rays, reflected_rays, refracted_rays, scattered_rays, texture_lookups] =
+            self.rays;
+        let rays = RayCounters {
+            camera_rays,
+            shadow_rays,
+            reflected_rays,
+            refracted_rays,
+            scattered_rays,
+            texture_lookups,
+        };
+        state.goals.decided = self.goals;
+        state.goals.judged = self.judged;
+        state.goals.brightness = self.brightness;
+        state.rays = self.cell_rays;
+        state.before = Before { rays, seconds: self.seconds };
+        state.render_seconds = self.seconds;
+        state.seconds = self.processor_seconds;
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> State {
+        State {
+            goals: vec![[4, 4]],
+            judged: vec![2],
+            brightness: Some(0.5),
+            cell_rays: vec![70],
+            rays: [10, 20, 30, 0, 5, 5],
+            seconds: 3.5,
+            processor_seconds: 7.0,
+        }
+    }
+
+    #[test]
+    fn impossible_numbers_are_found() {
+        assert!(state().is_possible());
+        for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
+            assert!(!State { seconds, ..state() }.is_possible(), "{seconds}");
+            assert!(!State { processor_seconds: seconds, ..state() }.is_possible(), "{seconds}");
+        }
+        for brightness in [-1.0, f64::NAN, f64::INFINITY] {
+            assert!(!State { brightness: Some(brightness), ..state() }.is_possible(), "{brightness}");
+        }
+        assert!(!State { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_possible());
+        assert!(!State { cell_rays: vec![1 << 57], ..state() }.is_possible());
+    }
+}

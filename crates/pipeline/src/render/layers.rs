@@ -1,0 +1,152 @@
+//! Layers of an EXR file: numbers about the pixels of the finished picture, by the same samples.
+//!
+//! A layer of light or of first hits is a film of its own, whose pixels get as many samples as those of the picture. So the parts of
+//! the light add up to the picture, also where noise decided how many samples a pixel has.
+
+use super::film_state::FilmState;
+use super::scheduler::{Rendering, Scheduler};
+use crate::film::{Convergence, Quantity, RadianceImage};
+use crate::integrators::View;
+use crate::keys;
+use crate::math::Vec3;
+use crate::output::LayerImage;
+use crate::scene::fingerprint::Fingerprint;
+use crate::settings::Layer;
+use crate::stages::Stop;
+use crate::stages::photons::PhotonStore;
+use crate::trace::Tracer;
+
+/// Names of the channels of colours, of directions and of numbers, as compositing programs know them.
+const COLOR: &[&str] = &["R", "G", "B"];
+const DIRECTION: &[&str] = &["X", "Y", "Z"];
+const DISTANCE: &[&str] = &["Z"];
+const NUMBER: &[&str] = &["X"];
+
+/// Origin of a layer's numbers.
+enum Source {
+    /// The samples of a view.
+    View(View),
+    /// Numbers of the picture's film.
+    Film(fn(&FilmState) -> RadianceImage),
+}
+
+impl Layer {
+    fn source(self) -> (Source, &'static [&'static str]) {
+        match self {
+            Self::Albedo => (Source::View(View::Albedo), COLOR),
+            Self::Normal => (Source::View(View::Normal), DIRECTION),
+            Self::Depth => (Source::View(View::Depth), DISTANCE),
+            Self::Variance => (Source::Film(variance), NUMBER),
+            Self::Samples => (Source::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
+            Self::Ambient => (Source::View(View::Ambient), COLOR),
+            Self::Diffuse => (Source::View(View::Diffuse), COLOR),
+            Self::Specular => (Source::View(View::Specular), COLOR),
+            Self::Emission => (Source::View(View::Emission), COLOR),
+        }
+    }
+
+    /// Work of a layer, next to that of the picture.
+    fn work(self) -> f64 {
+        match self {
+            Self::Albedo | Self::Normal | Self::Depth => 0.1,
+            Self::Variance | Self::Samples => 0.0,
+            Self::Ambient | Self::Diffuse | Self::Specular | Self::Emission => 1.0,
+        }
+    }
+}
+
+/// Variance of each pixel's luminance: the squared standard error of its mean.
+fn variance(state: &FilmState) -> RadianceImage {
+    let mut image = state.film.image(Quantity::Error);
+    image.pixels.iter_mut().for_each(|error| *error *= *error);
+    image
+}
+
+/// The part of all work, from 0 to 1, that is done before a layer and the part behind it. The picture comes before number 0.
+pub(crate) fn progress(layers: &[Layer], number: Option<usize>) -> [f64; 2] {
+    let work = |layers: &[Layer]| layers.iter().map(|layer| layer.work()).sum::<f64>();
+    let all = 1.0 + work(layers);
+    match number {
+        None => [0.0, 1.0 / all],
+        Some(number) => [number, number + 1].map(|end| (1.0 + work(&layers[..end])) / all),
+    }
+}
+
+/// The layers of a finished film, in their order.
+///
+/// # Errors
+/// Cancelled; no memory for a film.
+pub(crate) fn layers(
+    state: &FilmState,
+    rendering: &Rendering<'_>,
+    layers: &[Layer],
+) -> Result<Vec<LayerImage>, Stop> {
+    let mut images = Vec::with_capacity(layers.len());
+    for (number, layer) in layers.iter().enumerate() {
+        let (source, channels) = layer.source();
+        let image = match source {
+            Source::Film(image) => image(state),
+            Source::View(view) => of_view(view, state, rendering, progress(layers, Some(number)))?,
+        };
+        images.push(LayerImage { name: crate::choice::Choice::name(*layer), channels, image });
+    }
+    Ok(images)
+}
+
+/// The picture of a view by as many samples as a film has.
+fn of_view(
+    view: View,
+    picture: &FilmState,
+    rendering: &Rendering<'_>,
+    progress: [f64; 2],
+) -> Result<RadianceImage, Stop> {
+    let mut plan = rendering.plan.clone();
+    plan.settings.view = view;
+    // Samples are as many as the picture has, whatever ended it.
+    plan.settings.render.error = 0.0;
+    plan.settings.render.samples = picture.film.samples().max;
+    plan.time_seconds = None;
+    let photons = rendering.photons.filter(|_| plan.settings.gathers());
+    let convergence = match photons.is_some_and(PhotonStore::are_sent) {
+        true => Convergence::Photons,
+        false => Convergence::Stratified,
+    };
+    let key = keys::render(Fingerprint::new("layer").key(&picture.key).finish(), &plan.settings, plan.crop);
+    let mut state =
+        FilmState::new(key, &plan, rendering.most_film_bytes, convergence, None).map_err(Stop::work)?;
+    state.goals = picture.goals_of_what_is_done();
+    let sink = rendering.sink.within(progress);
+    let rendering = Rendering {
+        tracer: Tracer { settings: &plan.settings, ..rendering.tracer },
+        plan: &plan,
+        photons,
+        preview: None,
+        first: None,
+        sink: &sink,
+        // What a person orders meanwhile is about the picture.
+        pulse: &|_, _| (),
+        take_preview: &|| None,
+        share: None,
+        keeping: None,
+        ..*rendering
+    };
+    let signed = |normal: Vec3| if normal == Vec3::ZERO { normal } else { normal * 2.0 - Vec3::ONE };
+    let mut scheduler = Scheduler::new(&mut state, &rendering);
+    scheduler.changed = if view == View::Normal { Some(&signed) } else { None };
+    scheduler.run()?;
+    Ok(state.film.image(Quantity::Radiance))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn progress_goes_from_the_picture_through_all_layers() {
+        let all = [Layer::Depth, Layer::Samples, Layer::Diffuse, Layer::Specular];
+        let ends: Vec<_> = [None, Some(0), Some(1), Some(2), Some(3)].map(|at| progress(&all, at)).to_vec();
+        assert_eq!((ends[0][0], ends[4][1]), (0.0, 1.0));
+        assert!(ends.windows(2).all(|two| two[0][1] == two[1][0]), "{ends:?}");
+        assert_eq!(progress(&[], None), [0.0, 1.0]);
+    }
+}

@@ -1,0 +1,318 @@
+//! Goals by noise: which parts of a picture have enough samples.
+//!
+//! A picture whose samples decide by themselves when they stop is too dark: rare bright samples end no sampling before they are
+//! met, and prolong it once they are. So each half of a tile, every other pixel, stops by the noise of the other half, whose
+//! samples are independent and about as noisy. A tenth of the bias is left, as a half that has stopped tells the other no more;
+//! at worst that is a thirtieth of the noise.
+
+use crate::film::{CELLS, Convergence, Film, HalfNoise, PREPASS_SAMPLES, Prepass, samples_to_reduce_error};
+
+/// Samples before which noise is not asked for.
+pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
+
+/// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
+pub(crate) const AIM: f64 = 0.85;
+
+/// Ratio to the requested error from which a tile counts as missed: above the chance errors of the measurement.
+const TOO_MUCH: f64 = 1.5;
+
+/// Most samples ever expected; [`u32::MAX`] means unknown.
+pub(crate) const MOST: u32 = u32::MAX - 1;
+
+/// The least brightness that noise is held against, as a part of the picture's.
+const LEAST_BRIGHTNESS: f64 = 0.01;
+
+/// Samples that the halves of each cell are to have.
+#[derive(Debug)]
+pub(crate) struct Goals {
+    /// Decided goals; [`u32::MAX`] while undecided.
+    pub(super) decided: Vec<[u32; 2]>,
+    /// Samples at which each tile was judged last: once for each number.
+    pub(super) judged: Vec<u32>,
+    /// Mean luminance of the picture's [`Prepass`], when noise was first asked for.
+    pub(super) brightness: Option<f64>,
+}
+
+impl Goals {
+    /// For so many cells, of which nothing is known.
+    pub(crate) fn none(cells: usize) -> Self {
+        Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
+    }
+
+    /// Samples that a half of a cell is to have at most.
+    pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
+        self.decided[cell][half]
+    }
+
+    /// Bytes that they take.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        size_of_val(self.decided.as_slice()) + size_of_val(self.judged.as_slice())
+    }
+
+    /// Whether any half gets fewer samples than these.
+    pub(crate) fn are_below(&self, samples: u32) -> bool {
+        self.decided.as_flattened().iter().any(|goal| *goal < samples)
+    }
+
+    /// Decide for every half that has no goal yet and has now `samples`, a power of two, by the noise of the other one. `done` are
+    /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided. In a pool
+    /// its threads share the work.
+    pub(crate) fn judge(
+        &mut self,
+        film: &Film,
+        done: &[[u32; 2]],
+        samples: u32,
+        error: f64,
+    ) -> Option<Judgement> {
+        let is_time = samples >= LEAST && !self.lacks_least(done);
+        if is_time && self.brightness.is_none() {
+            self.brightness = Prepass::new(film.crop()).film_mean(film);
+        }
+        let brightness = self.brightness.or_else(|| film.mean_luminance())?;
+        let aim = Aim { error, brightness, convergence: film.convergence() };
+        let is_open = |tile: usize| self.judged[tile] < samples && self.is_open(tile, done, samples);
+        let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::of(film, tile)));
+        if is_time {
+            self.decide(&noise, done, samples, &aim);
+            let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
+            judged.for_each(|(judged, _)| *judged = samples);
+        }
+        Some(Judgement { noise, samples, aim })
+    }
+
+    /// Tiles that have all samples which they are to have, and more noise than [`TOO_MUCH`] times the error asked for: what is in few
+    /// pixels of one half alone does not hold that half up. And the noise of the worst of them.
+    pub(crate) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
+        let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
+        let noise = film.map_tiles(|tile| {
+            let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
+            let halves = || [0, 1].map(|half| film.tile_noise(tile, half)).into_iter().flatten();
+            let count = halves().count() as f64;
+            let all =
+                halves().fold((0.0, 0.0), |(v, m), one| (v + one.variance / count, m + one.mean / count));
+            let whole = halves().next().map(|half| HalfNoise { variance: all.0, mean: all.1, ..half });
+            let mut cells = self.decided.iter().skip(CELLS * tile).take(CELLS);
+            whole.filter(|_| cells.all(is_decided)).map(|noise| aim.relative(&noise))
+        });
+        let too_much = || noise.iter().flatten().filter(|noise| **noise > TOO_MUCH * error);
+        let worst = too_much().copied().max_by(f64::total_cmp)?;
+        Some((too_much().count(), worst))
+    }
+
+    /// Whether a half in a tile has no goal yet, and has now so many samples.
+    pub(crate) fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
+        let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
+        cells
+            .flat_map(|(goals, done)| goals.iter().zip(done))
+            .any(|(goal, done)| *goal == u32::MAX && *done == samples)
+    }
+
+    /// Whether a half that is to have them has fewer samples than the least.
+    fn lacks_least(&self, done: &[[u32; 2]]) -> bool {
+        let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
+        halves.any(|(goal, done)| goal > done && *done < LEAST)
+    }
+
+    fn decide(&mut self, noise: &[Option<TileNoise>], done: &[[u32; 2]], samples: u32, aim: &Aim) {
+        for (cell, done) in done.iter().enumerate() {
+            let was_decided = self.decided[cell].map(|goal| goal < u32::MAX);
+            if (0..2).all(|half| was_decided[half] || done[half] != samples) {
+                continue;
+            }
+            let Some(TileNoise { halves: [even, odd], .. }) = noise[cell / CELLS] else { continue };
+            // A tile of one pixel has no other half.
+            let of_others = [odd.or(even), even.or(odd)];
+            for half in 0..2 {
+                let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
+                let wanted = aim.samples(&noise);
+                // Where the other half has no more samples to come, nothing more will be known.
+                if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
+                    self.decided[cell][half] = wanted.max(done[half]);
+                }
+            }
+        }
+    }
+}
+
+/// Noise that goals were decided by.
+#[derive(Debug)]
+pub(crate) struct Judgement {
+    /// Noise of each tile. `None` for a tile that has its goals, or other samples.
+    pub(crate) noise: Vec<Option<TileNoise>>,
+    /// Samples that the tiles had.
+    pub(crate) samples: u32,
+    pub(crate) aim: Aim,
+}
+
+/// Noise of a tile, by its samples.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TileNoise {
+    pub(crate) halves: [Option<HalfNoise>; 2],
+    /// Ratio of its variance before and after the last doubling of samples.
+    pub(crate) fall: Option<f64>,
+}
+
+impl TileNoise {
+    fn of(film: &Film, tile: usize) -> Self {
+        let noise = |half| {
+            let noise = film.tile_noise(tile, half)?;
+            // The upper end of what it may be: where few bright pixels tell it, others may not have been met yet.
+            Some(HalfNoise { variance: noise.variance * (1.0 + film.tile_spread(tile, half)), ..noise })
+        };
+        Self { halves: [0, 1].map(noise), fall: film.tile_fall(tile) }
+    }
+}
+
+/// The error to reach, and the brightness that it is relative to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Aim {
+    /// The requested error.
+    pub(crate) error: f64,
+    /// Mean luminance of the picture.
+    brightness: f64,
+    pub(crate) convergence: Convergence,
+}
+
+impl Aim {
+    /// Samples that bring noise to the error asked for.
+    fn samples(&self, noise: &HalfNoise) -> u32 {
+        let relative = self.relative(noise);
+        if !(relative > 0.0) {
+            return noise.samples;
+        }
+        let part = AIM * self.error / relative;
+        let doubled = noise.samples.saturating_mul(2);
+        // Up to the next power of two each sample counts as an independent one, there all of them are worth more.
+        if 1.0 / (part * part) <= libm::exp2(noise.power) {
+            return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
+        }
+        let power = noise.power.min(self.convergence.usual_power());
+        samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
+    }
+
+    /// Noise over the brightness that it is held against.
+    pub(crate) fn relative(&self, noise: &HalfNoise) -> f64 {
+        noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::film::{PixelSubset, Pixels, Rect, TileSamples};
+    use crate::math::Vec3;
+    use crate::math::random::unit;
+
+    /// A film of one tile, whose halves have samples of a mean and a spread each.
+    pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
+        const COLUMNS: u32 = 32;
+        let film = Film::new(COLUMNS, 2, None).expect("a film");
+        let mut next = unit(3);
+        for (half, (mean, spread)) in halves.into_iter().enumerate() {
+            let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
+            let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
+            let radiance = (0..COLUMNS * samples).map(sample).collect();
+            film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
+        }
+        film
+    }
+
+    fn judged(halves: [(f32, f32); 2], samples: u32, error: f64) -> Goals {
+        let mut goals = Goals::none(1);
+        goals.judge(&film(halves, samples), &[[samples; 2]], samples, error);
+        goals
+    }
+
+    #[test]
+    fn each_half_stops_by_the_noise_of_the_other() {
+        // The first half is smooth, the other one is not.
+        let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        assert_eq!(goals.of(0, 1), 16, "the other half has no noise");
+        assert_eq!(goals.of(0, 0), u32::MAX);
+    }
+
+    #[test]
+    fn noise_that_one_half_alone_has_is_told_where_it_stays() {
+        let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
+        let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
+        assert_eq!(goals.missed(&rough, 0.01), None, "the first half goes on");
+        let clean = judged([(1.0, 0.0); 2], 16, 0.01);
+        assert_eq!(clean.missed(&film([(1.0, 0.0); 2], 16), 0.01), None);
+        // A standard error of √(1/12/16), in one of two halves.
+        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("nothing is told") };
+        assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");
+    }
+
+    #[test]
+    fn nothing_is_decided_before_there_are_samples_enough() {
+        for (samples, is_open) in [(8, true), (16, false)] {
+            let goals = judged([(1.0, 0.0); 2], samples, 0.01);
+            assert_eq!(goals.of(0, 0) == u32::MAX, is_open, "{samples}");
+        }
+    }
+
+    #[test]
+    fn what_is_within_twice_the_samples_is_decided_and_more_is_asked_for_again() {
+        // A standard error of sqrt(1/12/16) = 0.072, which may be 0.082 by so few pixels: 24 samples bring that to the aim.
+        let goals = judged([(1.0, 1.0); 2], 16, 0.08);
+        assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
+        assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
+    }
+
+    #[test]
+    fn noise_is_held_against_a_hundredth_of_the_picture_where_it_is_dark() {
+        // A bright tile beside a dark one, with as much noise for their brightness.
+        let film = Film::new(64, 2, None).expect("a film");
+        let mut next = unit(9);
+        for (tile, mean) in [(0, 1.0), (1, 1e-6)] {
+            let rect = Rect { x: 32 * tile, y: 0, width: 32, height: 2 };
+            let radiance = (0..64 * 16).map(|_| Vec3::splat(mean * 2.0 * next())).collect();
+            film.add(
+                tile as usize,
+                &TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None },
+            );
+        }
+        let mut goals = Goals::none(2 * CELLS);
+        goals.judge(&film, &[[16; 2]; 2 * CELLS], 16, 0.01);
+        assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
+    }
+
+    /// The mean of a tile whose samples are rarely bright, 1 in the long run, and which stops by its noise; or where each half stops
+    /// by its own.
+    fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
+        const MOST: u32 = 256;
+        let film = Film::new(4, 4, None).expect("a film");
+        let (mut goals, mut done) = (Goals::none(1), [[0; 2]]);
+        for target in [16, 32, 64, 128, MOST] {
+            for half in 0..2 {
+                let goal = goals.of(0, if by_own { 1 - half } else { half }).min(target);
+                let samples = goal.saturating_sub(done[0][half]);
+                let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
+                let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
+                let radiance = (0..8 * samples).map(sample).collect();
+                film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
+                done[0][half] += samples;
+            }
+            goals.judge(&film, &done, target, 0.6);
+        }
+        film.mean_luminance().expect("samples")
+    }
+
+    #[test]
+    fn to_stop_by_the_noise_of_the_other_half_is_next_to_no_bias() {
+        let mut next = unit(11);
+        let mut mean_of = |by_own| {
+            const TILES: u32 = 20_000;
+            let means: Vec<f64> = (0..TILES).map(|_| stopped(&mut next, by_own)).collect();
+            let mean = means.iter().sum::<f64>() / f64::from(TILES);
+            let variance = means.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / f64::from(TILES);
+            (mean, (variance / f64::from(TILES)).sqrt())
+        };
+        let (mean, error) = mean_of(false);
+        let (own, own_error) = mean_of(true);
+        assert!(error.max(own_error) < 0.004, "{error} {own_error}");
+        // The noise asked for is 0.6.
+        assert!((mean - 1.0).abs() < 0.04 * 0.6, "{mean} ± {error}");
+        assert!(own < 0.9, "the samples tell what stops by itself: {own} ± {own_error}");
+    }
+}

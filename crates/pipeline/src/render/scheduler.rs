@@ -1,0 +1,400 @@
+//! The schedule of a render: first picture, first pass, later passes, and rounds if there is a budget of time.
+
+use std::cell::Cell;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::film_state::{Before, FilmState};
+use super::first_picture::FirstPictures;
+use super::forecast::{Forecast, Moment};
+use super::keeping::Keeping;
+use super::noise_goals::LEAST;
+use super::preview::Screen;
+use super::share::Share;
+use super::time_budget::next_round;
+use crate::film::{PREPASS_SAMPLES, Prepass, Rect, TILE_SIZE, TileSamples};
+use crate::integrators::{PhotonMaps, RayCounters};
+use crate::math::Vec3;
+use crate::pace::Clock;
+use crate::plan::Plan;
+use crate::protocol::{PreviewSize, Section};
+use crate::scene::description::Render;
+use crate::sink::Sink;
+use crate::stages::Stop;
+use crate::stages::photons::{PhotonStore, Sending};
+use crate::trace::{Job, Tracer, next_pass};
+
+/// Shortest time between two reports of progress.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
+/// Shortest time between two previews.
+const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
+/// A preview takes at most one part in so many of the time.
+const PREVIEW_SHARE: u32 = 10;
+
+/// A render: the inputs of the stage.
+pub(crate) struct Rendering<'a> {
+    pub(crate) tracer: Tracer<'a>,
+    pub(crate) plan: &'a Plan,
+    /// The scene's photons, if it gathers any.
+    pub(crate) photons: Option<&'a PhotonStore>,
+    pub(crate) preview: Option<PreviewSize>,
+    pub(crate) most_film_bytes: u64,
+    /// Start from an empty film whatever is kept.
+    pub(crate) force: bool,
+    /// The section that gets its samples first.
+    pub(crate) first: Option<Section>,
+    pub(crate) sink: &'a Sink,
+    /// Called often with the film as it is, for orders that come during the render; and whether every pixel of it
+    /// has a sample.
+    pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
+    /// Takes an order for another size of the previews.
+    pub(crate) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
+    /// Whether somebody is moving the camera: the first picture must come soon, however small it is.
+    pub(crate) is_moved: bool,
+    /// Pixels of first pictures that are traced in a second, as the last one was.
+    pub(crate) coarse_rate: &'a Cell<Option<f64>>,
+    /// The share of the picture that is rendered. `None` for all of it.
+    pub(crate) share: Option<Share>,
+    /// Checkpoints, if there are any.
+    pub(crate) keeping: Option<&'a Keeping<'a>>,
+}
+
+/// One run of the stage: passes and rounds over a film, with progress and previews between the tiles.
+pub(crate) struct Scheduler<'a> {
+    pub(crate) state: &'a mut FilmState,
+    rendering: &'a Rendering<'a>,
+    screen: Screen<'a>,
+    clock: Clock,
+    forecast: Forecast,
+    /// Pixels times samples.
+    units: u64,
+    /// Units of earlier renders.
+    units_before: u64,
+    pub(crate) rays: RayCounters,
+    /// Seconds of the process whose checkpoint this goes on from.
+    seconds_before: f64,
+    /// Whether some pixels have no sample yet: until they have, nothing but a cancel ends the render.
+    is_first: bool,
+    is_over_time: bool,
+    next_progress: Instant,
+    next_preview: Instant,
+    /// Change of each sample before it is added. `None` for samples that stay as they are.
+    pub(crate) changed: Option<&'a (dyn Fn(Vec3) -> Vec3 + Sync)>,
+}
+
+impl<'a> Scheduler<'a> {
+    pub(crate) fn new(state: &'a mut FilmState, rendering: &'a Rendering<'a>) -> Self {
+        let units = state.units();
+        let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
+        let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
+        let Before { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
+        Self {
+            is_first: !state.is_covered(),
+            state,
+            rendering,
+            screen: Screen { bounds, plan: rendering.plan, sink: rendering.sink },
+            clock: Clock::start(),
+            forecast,
+            units,
+            units_before: units,
+            rays,
+            seconds_before,
+            is_over_time: false,
+            next_progress: Instant::now(),
+            next_preview: Instant::now(),
+            changed: None,
+        }
+    }
+
+    /// Brings the film to the requested samples or error.
+    ///
+    /// # Errors
+    /// Cancelled. The film keeps what it has.
+    pub(crate) fn run(&mut self) -> Result<(), Stop> {
+        self.state.is_kept = false;
+        let ran = self.go();
+        let (traced, seconds) = (self.traced(), self.rendered_seconds());
+        if let (Some(keeping), Err(Stop::Cancelled)) = (self.rendering.keeping, &ran) {
+            self.state.is_kept = keeping.at_the_end(self.state, traced, seconds);
+        }
+        self.state.traced = traced;
+        ran
+    }
+
+    /// Rays of all requests for this film.
+    pub(crate) fn traced(&self) -> RayCounters {
+        let mut traced = self.state.traced;
+        traced += self.rays;
+        traced
+    }
+
+    /// Seconds in which all requests have rendered this film.
+    fn rendered_seconds(&mut self) -> f64 {
+        self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
+    }
+
+    /// Seconds of rendering, those of an earlier process too.
+    pub(crate) fn seconds(&mut self) -> f64 {
+        self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
+    }
+
+    fn go(&mut self) -> Result<(), Stop> {
+        self.report_progress(false);
+        if self.is_first {
+            if self.state.base.is_none() {
+                self.coarse()?;
+            }
+            let first = self.first();
+            if first.is_some() {
+                self.pass(first, 1)?;
+            }
+            self.pass(None, 1)?;
+            self.is_first = false;
+            self.state.base = None;
+            self.show();
+            self.tick();
+        }
+        let Render { samples, error, .. } = self.rendering.plan.settings.render;
+        if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
+            self.pilot()?;
+        }
+        if let Some(first) = self.first() {
+            // Noise is held against the brightness of the whole picture, which is known then.
+            let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
+            self.passes(None, of_all)?;
+            self.passes(Some(first), samples)?;
+        }
+        self.passes(None, samples)?;
+        self.show();
+        self.report_progress(true);
+        Ok(())
+    }
+
+    /// The pixels that come before the rest.
+    fn first(&self) -> Option<Rect> {
+        let Render { width, height, .. } = self.rendering.plan.settings.render;
+        self.rendering.first.map(|section| section.pixels((width, height)))
+    }
+
+    /// Renders the pilot of the picture, of which this process has a share.
+    fn pilot(&mut self) -> Result<(), Stop> {
+        if self.state.goals.brightness.is_some() {
+            return Ok(());
+        }
+        let pilot = Prepass::new(self.state.film.crop());
+        let job = |number: u64| {
+            let (x, y) = pilot.position(number);
+            let pixels = Rect { x, y, width: 1, height: 1 }.into();
+            // The job's number stands for its tile.
+            Job { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
+        };
+        let jobs: Vec<Job> = (0..pilot.count()).map(job).collect();
+        let mut luminances = vec![None; jobs.len()];
+        let keep = |_: &Job, samples: TileSamples| Prepass::luminance(samples);
+        self.rendering.tracer.run(&jobs, keep, |result| {
+            if let Some((job, luminance, cost)) = result {
+                luminances[job.tile] = luminance;
+                self.rays += cost.rays;
+            }
+            true
+        })?;
+        self.state.goals.brightness = pilot.mean(|number| luminances[number as usize]);
+        Ok(())
+    }
+
+    /// Judges the noise that a checkpoint or a cancelled request has left unjudged.
+    fn judge_what_is_there(&mut self, part: Option<Rect>) {
+        let Render { samples, error, .. } = self.rendering.plan.settings.render;
+        let done = self.state.samples_in(part, samples);
+        // Nothing is decided by fewer samples.
+        if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
+            self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
+        }
+    }
+
+    /// Pass after pass until a part (none: all) has so many samples, or those that it is to have.
+    fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
+        let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
+        self.judge_what_is_there(part);
+        while !self.state.is_complete_in(part, samples) && !self.is_over_time {
+            if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
+                self.round(&goals)?;
+                self.look_at_noise();
+                continue;
+            }
+            let pixels = self.state.film.crop().area();
+            let target = next_pass(self.state.samples_in(part, samples), samples, pixels);
+            self.pass(part, target)?;
+            if target.is_power_of_two() {
+                self.look_at_noise();
+            }
+            if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
+                self.rendering.tracer.pool.install(|| self.state.judge(target, error.into()));
+                self.forecast.expect_again(self.state, most);
+            }
+        }
+        Ok(())
+    }
+
+    fn look_at_noise(&mut self) {
+        let Tracer { pool, token, .. } = self.rendering.tracer;
+        let seconds = self.clock.seconds(token.is_paused());
+        self.forecast.look_at_noise(self.state, pool, seconds);
+    }
+
+    /// All tiles of a part that have fewer samples than `target`.
+    fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
+        let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None, 0) };
+        while !self.state.is_complete_in(part, target) && !self.is_over_time {
+            let samples = self.state.samples_in(part, target);
+            let at_once = samples..target.min(samples.saturating_add(photons.at_once()));
+            let numbers = self.state.numbers(at_once);
+            let end = samples + numbers.len() as u32;
+            // Photons that no time is left for are not sent, nor gathered.
+            self.tick();
+            if self.is_over_time {
+                break;
+            }
+            let maps = self.maps(photons, numbers.clone())?;
+            if self.is_over_time {
+                break;
+            }
+            self.pass_by(part, |_, _| end, Some(&maps), numbers.start - samples)?;
+        }
+        Ok(())
+    }
+
+    /// The photons of some samples; orders are heard while they are sent.
+    fn maps(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
+        let Rendering { plan, sink, tracer, .. } = *self.rendering;
+        let Tracer { pool, world, token, .. } = tracer;
+        let begin = self.clock.seconds(token.is_paused());
+        self.forecast.begin_photons(begin);
+        let maps = photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?;
+        self.forecast.end_photons(self.clock.seconds(token.is_paused()));
+        Ok(maps)
+    }
+
+    /// Next samples of each half of each cell, under a budget of time: more where they lower the error most. `None` with photons,
+    /// which cost as much for one cell as for all, and with a noise threshold, which places samples by itself.
+    fn next_round(&self) -> Option<Vec<[u32; 2]>> {
+        let Rendering { plan, photons, .. } = *self.rendering;
+        let Render { samples, error, .. } = plan.settings.render;
+        if plan.time_seconds.is_none() || photons.is_some() || error > 0.0 {
+            return None;
+        }
+        next_round(&self.state.film, &self.state.done, &self.state.rays, samples)
+    }
+
+    /// Bring the halves of all cells to these samples, in steps that are short.
+    fn round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
+        const STEP: Duration = Duration::from_millis(30);
+        /// Pixels of half a tile.
+        const PIXELS: f64 = (TILE_SIZE * TILE_SIZE / 2) as f64;
+        let seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
+        let threads = self.rendering.tracer.pool.current_num_threads() as f64;
+        let rate = (self.units - self.units_before) as f64 / seconds / threads;
+        let most = ((rate * STEP.as_secs_f64() / PIXELS) as u32).max(16);
+        while !self.is_over_time {
+            let done = self.state.done.clone();
+            if done == goals {
+                break;
+            }
+            self.pass_by(
+                None,
+                |cell, half| goals[cell][half].min(done[cell][half].saturating_add(most)),
+                None,
+                0,
+            )?;
+        }
+        Ok(())
+    }
+
+    fn pass_by(
+        &mut self,
+        part: Option<Rect>,
+        target: impl Fn(usize, usize) -> u32,
+        photons: Option<&PhotonMaps>,
+        first: u32,
+    ) -> Result<(), Stop> {
+        let jobs = self.state.jobs(part, target);
+        let tracer = Tracer { photons, first, ..self.rendering.tracer };
+        let film = Arc::clone(&self.state.film);
+        let changed = self.changed;
+        let keep = |job: &Job, mut samples: TileSamples| {
+            if let Some(changed) = changed {
+                samples.radiance.iter_mut().for_each(|sample| *sample = changed(*sample));
+            }
+            film.add(job.tile, &samples);
+        };
+        tracer.run(&jobs, keep, |result| {
+            if let Some((job, (), cost)) = result {
+                self.units += self.state.note(job, &cost);
+                self.rays += cost.rays;
+            }
+            self.tick();
+            !self.is_over_time
+        })?;
+        Ok(())
+    }
+
+    /// Does all that is due between two tiles: progress, previews, orders, the budget of time.
+    fn tick(&mut self) {
+        let now = Instant::now();
+        if now >= self.next_progress {
+            self.next_progress = now + PROGRESS_INTERVAL;
+            self.report_progress(false);
+        }
+        if let Some(bounds) = (self.rendering.take_preview)() {
+            (self.screen.bounds, self.next_preview) = (bounds, now);
+        }
+        if now >= self.next_preview && self.screen.show_some(self.state) {
+            self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
+        }
+        (self.rendering.pulse)(self.state, !self.is_first);
+        let seconds = self.seconds();
+        if let Some(keeping) = self.rendering.keeping {
+            let rendered = self.rendered_seconds();
+            keeping.tick(self.state, self.traced(), rendered);
+        }
+        let budget = self.rendering.plan.time_seconds;
+        self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
+    }
+
+    pub(crate) fn show(&mut self) {
+        let Tracer { pool, token, .. } = self.rendering.tracer;
+        self.screen.show(self.state, pool, token);
+        self.next_preview = Instant::now() + PREVIEW_INTERVAL;
+    }
+
+    /// Tells how far the render is, and when it is expected to end.
+    fn report_progress(&mut self, is_last: bool) {
+        let elapsed_seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
+        let Rendering { plan, photons, sink, .. } = *self.rendering;
+        let (state, units, is_first) = (&*self.state, self.units, self.is_first);
+        let moment = Moment { state, plan, photons, elapsed_seconds, units, is_first, is_last };
+        sink.progress(self.forecast.progress(&moment));
+    }
+
+    fn first_pictures(&self) -> FirstPictures<'a> {
+        let Rendering { tracer, plan, is_moved, coarse_rate: rate, .. } = *self.rendering;
+        FirstPictures { tracer, plan, is_moved, rate }
+    }
+
+    /// Traces first pictures with one sample a pixel, if they are much less work than one pass.
+    fn coarse(&mut self) -> Result<(), Stop> {
+        let Some(shown) = self.screen.size() else { return Ok(()) };
+        let coarse = self.first_pictures();
+        for size in coarse.sizes(shown) {
+            let maps = match self.rendering.photons {
+                Some(photons) => Some(self.maps(photons, 0..1)?),
+                None => None,
+            };
+            let picture = coarse.picture(maps.as_ref(), size, || {})?;
+            self.state.base = Some(picture.resized(shown.0, shown.1));
+            self.show();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! The share of a picture that one of several processes renders.
+//!
+//! Tiles with all their samples are dealt; with photons, whose passes are dear, blocks of samples are, for all tiles. If there are
+//! more shares than blocks, the tiles of a block are dealt among several. The order in which they are dealt is scrambled, so that
+//! shares cost about the same, and fixed, so that each process knows its own.
+
+use std::ops::Range;
+
+use crate::film::{BLOCK_SIZE, SumOrder};
+use crate::math::random::hash;
+
+/// A share of a picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Share {
+    /// From 1.
+    pub(crate) index: u32,
+    /// Number of shares.
+    pub(crate) count: u32,
+    /// Samples of a pixel in the whole picture.
+    pub(crate) samples: u32,
+    /// Its blocks of samples. `None` if its tiles have all their samples.
+    blocks: Option<Vec<u32>>,
+    /// Place among those who share the tiles, and their number.
+    of_tiles: (u32, u32),
+}
+
+impl Share {
+    /// One share of so many of a picture with so many samples; `has_photons` if passes of photons are dealt.
+    pub(crate) fn new((index, count): (u32, u32), has_photons: bool, samples: u32) -> Self {
+        let number = index - 1;
+        if !has_photons {
+            return Self { index, count, samples, blocks: None, of_tiles: (number, count) };
+        }
+        let order = dealt(samples.div_ceil(BLOCK_SIZE));
+        let block_count = order.len() as u32;
+        let (mut blocks, of_tiles) = if count <= block_count {
+            let own = order.iter().skip(number as usize).step_by(count as usize);
+            (own.copied().collect::<Vec<_>>(), (0, 1))
+        } else {
+            let place = number % block_count;
+            (vec![order[place as usize]], (number / block_count, (count - place).div_ceil(block_count)))
+        };
+        blocks.sort_unstable();
+        Self { index, count, samples, blocks: Some(blocks), of_tiles }
+    }
+
+    /// Samples that each of its pixels gets.
+    pub(crate) fn own_samples(&self) -> u32 {
+        match &self.blocks {
+            None => self.samples,
+            Some(blocks) => blocks.iter().map(|block| self.length(*block)).sum(),
+        }
+    }
+
+    /// Numbers of the first of these samples of a pixel of its own, up to the end of their block.
+    pub(crate) fn numbers(&self, own: Range<u32>) -> Range<u32> {
+        let Some(blocks) = &self.blocks else { return own };
+        let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
+        let start = block * BLOCK_SIZE + own.start % BLOCK_SIZE;
+        start..(start + (own.end - own.start)).min(block * BLOCK_SIZE + self.length(*block))
+    }
+
+    /// Order in which its samples are added up.
+    pub(crate) fn sums(&self) -> SumOrder {
+        match &self.blocks {
+            None => SumOrder::Sequential,
+            Some(blocks) => SumOrder::SeparateBlocks(
+                blocks.iter().filter(|block| self.length(**block) == BLOCK_SIZE).count(),
+            ),
+        }
+    }
+
+    /// Its blocks, in their order; none if it has tiles with all their samples.
+    pub(crate) fn blocks(&self) -> &[u32] {
+        self.blocks.as_deref().unwrap_or_default()
+    }
+
+    /// Number of blocks in the picture; 0 if tiles have all their samples.
+    pub(crate) fn block_count(&self) -> u32 {
+        if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
+    }
+
+    /// Whether each of so many tiles is its own.
+    pub(crate) fn tiles(&self, count: usize) -> Vec<bool> {
+        let (place, of) = self.of_tiles;
+        let mut own = vec![false; count];
+        for tile in dealt(count as u32).into_iter().skip(place as usize).step_by(of as usize) {
+            own[tile as usize] = true;
+        }
+        own
+    }
+
+    /// Samples of a block.
+    fn length(&self, block: u32) -> u32 {
+        (self.samples - block * BLOCK_SIZE).min(BLOCK_SIZE)
+    }
+}
+
+/// Numbers below `count` in the order in which they are dealt.
+fn dealt(count: u32) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..count).collect();
+    order.sort_by_key(|number| (hash(u64::from(*number)), *number));
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    /// Every tile has every sample in one share, and in no other.
+    #[test]
+    fn shares_are_the_whole_and_none_has_what_another_has() {
+        for (samples, tiles) in [(1, 1), (16, 6), (250, 7), (256, 40)] {
+            for count in [1, 2, 3, 8, 64, 100] {
+                for has_photons in [false, true] {
+                    let mut seen = HashSet::new();
+                    for index in 1..=count {
+                        let share = Share::new((index, count), has_photons, samples);
+                        let own = share.tiles(tiles);
+                        for tile in (0..tiles).filter(|tile| own[*tile]) {
+                            let mut done = 0;
+                            while done < share.own_samples() {
+                                let numbers = share.numbers(done..share.own_samples());
+                                done += numbers.len() as u32;
+                                assert!(numbers.clone().all(|number| seen.insert((tile, number))));
+                            }
+                        }
+                    }
+                    assert_eq!(
+                        seen.len(),
+                        tiles * samples as usize,
+                        "{samples} {tiles} {count} {has_photons}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_blocks_of_a_share_lie_all_over_the_picture() {
+        let share = Share::new((1, 2), true, 4096);
+        let first = share.blocks().iter().filter(|block| **block < 128).count();
+        assert!((44..=84).contains(&first), "{first} of 128 in the first half");
+        assert_eq!(share.sums(), SumOrder::SeparateBlocks(128));
+        assert_eq!(Share::new((1, 1), true, 40).sums(), SumOrder::SeparateBlocks(2));
+        assert_eq!(Share::new((1, 1), true, 40).block_count(), 3);
+    }
+}

@@ -1,0 +1,155 @@
+//! The report of a finished request: made from its results, and written to its file.
+
+use std::path::{Path, PathBuf};
+
+use super::{Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts};
+use crate::control::CancelToken;
+use crate::film::range_map::RangeMap;
+use crate::inputs::Inputs;
+use crate::integrators::{RayCounters, receivers};
+use crate::output::write::atomic_until;
+use crate::output::{OutputError, json};
+use crate::plan::Plan;
+use crate::protocol::StageReport;
+use crate::render::film_cache::FilmCache;
+use crate::render::film_state::FilmState;
+use crate::sink::Sink;
+use crate::targets::guarded;
+use crate::world::World;
+
+/// Results of a request.
+#[derive(Clone, Copy)]
+pub(crate) struct Finished<'a> {
+    pub(crate) scene: &'a Path,
+    pub(crate) plan: &'a Plan,
+    pub(crate) world: &'a World,
+    pub(crate) canvas: &'a FilmState,
+    pub(crate) films: &'a FilmCache,
+    pub(crate) rays: RayCounters,
+    pub(crate) texels_loaded: u64,
+    pub(crate) texture_memory_bytes: u64,
+    pub(crate) photons: Option<PhotonsReport>,
+    pub(crate) is_written: bool,
+}
+
+pub(crate) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds: f64) -> Report {
+    Report {
+        glimt: env!("CARGO_PKG_VERSION"),
+        scene: finished.scene.to_string_lossy().into_owned(),
+        image: image(finished),
+        settings: finished.plan.effective.clone(),
+        lights: lights(finished),
+        photons: finished.photons,
+        stages,
+        counters: counters(finished),
+        seconds,
+        peak_memory_bytes: peak_memory_bytes(),
+    }
+}
+
+/// Write it where the plan says.
+///
+/// # Errors
+/// Why not, with the file's name.
+pub(crate) fn write_report(
+    plan: &Plan,
+    inputs: &Inputs,
+    report: &Report,
+    sink: &Sink,
+    token: &CancelToken,
+) -> Result<(), OutputError> {
+    let Some(path) = &plan.report else { return Ok(()) };
+    let unwritable =
+        |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
+    let text = json::file(report).map_err(unwritable)?;
+    guarded(plan, inputs, path, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
+}
+
+fn image(finished: &Finished<'_>) -> ImageReport {
+    let plan = finished.plan;
+    let samples = finished.canvas.film.samples();
+    let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
+    let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
+    ImageReport {
+        path: paths.first().cloned(),
+        paths,
+        width: plan.settings.render.width,
+        height: plan.settings.render.height,
+        samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
+        error: finished.canvas.film.relative_error(),
+        render_seconds: finished.canvas.render_seconds,
+        complete: finished.canvas.is_complete(plan.settings.render.samples),
+        range: range(finished),
+    }
+}
+
+fn lights(finished: &Finished<'_>) -> LightsReport {
+    let lights = &finished.world.lights;
+    let settings = &finished.plan.settings;
+    let samples = u64::from(settings.render.shadow_samples);
+    let are_gathered = settings.gathers() && finished.photons.is_some_and(|photons| photons.emitted > 0);
+    let selection = lights.sampler(receivers(settings, are_gathered));
+    let (sampled, picks) = match selection {
+        Some(selection) => (LightsSampled::Picked, samples * u64::from(selection.picks.count)),
+        None => (LightsSampled::All, 0),
+    };
+    LightsReport {
+        count: lights.len() as u64,
+        sampled,
+        picks,
+        tree_nodes: selection.map_or(0, |selection| selection.tree.node_count()) as u64,
+        memory_bytes: lights.memory_bytes() as u64,
+    }
+}
+
+fn range(finished: &Finished<'_>) -> Option<[f32; 2]> {
+    let Finished { plan, canvas, .. } = finished;
+    if plan.tone.range_map == RangeMap::None {
+        return None;
+    }
+    let image = canvas.film.image(plan.settings.view.quantity());
+    plan.tone.resolved_for(&image).range_map.range().map(|range| range.limits())
+}
+
+fn counters(finished: &Finished<'_>) -> Counters {
+    let (world, rays) = (finished.world, finished.rays);
+    Counters {
+        triangles: world.triangle_count(),
+        objects: world.object_count(),
+        camera_rays: rays.camera_rays,
+        shadow_rays: rays.shadow_rays,
+        reflected_rays: rays.reflected_rays,
+        refracted_rays: rays.refracted_rays,
+        scattered_rays: rays.scattered_rays,
+        photons_emitted: finished.photons.map_or(0, |photons| photons.emitted),
+        photons_stored: finished.photons.map_or(0, |photons| photons.stored),
+        texels_loaded: finished.texels_loaded,
+        texture_memory_bytes: finished.texture_memory_bytes,
+        texture_lookups: rays.texture_lookups + finished.photons.map_or(0, |photons| photons.lookups),
+        non_finite_samples: finished.canvas.film.non_finite_samples(),
+        accel_memory_bytes: world.accel_memory_bytes() as u64,
+        films: finished.films.count() as u64,
+        film_memory_bytes: finished.films.memory_bytes(),
+    }
+}
+
+/// Highest resident memory of the process so far; 0 if the system does not tell it.
+fn peak_memory_bytes() -> u64 {
+    peak_of_program().unwrap_or_else(peak_of_process)
+}
+
+/// Highest resident memory of this program alone, if the system tells it (proc_pid_status(5)).
+fn peak_of_program() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?;
+    Some(kibibytes.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// Highest resident memory with that of the process before it became this program: the caller of glimt may have used much.
+fn peak_of_process() -> u64 {
+    use nix::sys::resource::{UsageWho, getrusage};
+    // Bytes on macOS, kibibytes elsewhere (getrusage(2)).
+    let unit = if cfg!(target_os = "macos") { 1 } else { 1024 };
+    let highest = getrusage(UsageWho::RUSAGE_SELF).map_or(0, |usage| usage.max_rss());
+    u64::try_from(highest).unwrap_or(0) * unit
+}

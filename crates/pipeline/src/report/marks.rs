@@ -1,0 +1,38 @@
+//! Marks that tell a report from other JSON.
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
+use crate::protocol::Stage;
+
+/// The keys that a report has in every version; nobody writes all of them by hand.
+#[derive(Deserialize)]
+pub(crate) struct Marks {
+    #[serde(rename = "glimt")]
+    _version: String,
+    #[serde(rename = "scene")]
+    _scene: String,
+    #[serde(rename = "image")]
+    _image: IgnoredAny,
+    #[serde(rename = "settings")]
+    _settings: IgnoredAny,
+    stages: Vec<StageMark>,
+    #[serde(rename = "counters")]
+    _counters: IgnoredAny,
+    #[serde(rename = "seconds")]
+    _seconds: f64,
+    #[serde(rename = "peak_memory_bytes")]
+    _peak_memory_bytes: u64,
+}
+
+#[derive(Deserialize)]
+struct StageMark {
+    name: String,
+}
+
+impl Marks {
+    /// Whether its stages are those of a render.
+    pub(crate) fn have_all_stages(&self) -> bool {
+        self.stages.iter().map(|stage| stage.name.as_str()).eq(Stage::ALL.map(Stage::name))
+    }
+}

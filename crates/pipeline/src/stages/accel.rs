@@ -1,0 +1,124 @@
+//! Trees: one per mesh file, kept while the file's content is the same, and the one over all objects; those of scenes before while
+//! there is room.
+
+use std::sync::Arc;
+
+use super::super::cache::{Memo, Pool, Spare};
+use super::super::keys;
+use super::meshes::Meshes;
+use super::{Reading, Staged, Stop};
+use crate::math::DVec3;
+use crate::scene::description::Scene;
+use crate::scene::fingerprint::{Key, Referents};
+use crate::world::{Geometry, MeshTree, light_lifts, with_lifted_lights};
+
+/// Cache of the stage.
+#[derive(Debug, Default)]
+pub(crate) struct AccelCache {
+    trees: Pool<Key, MeshTree>,
+    geometry: Pool<Key, Geometry>,
+    /// Translations of lights in the plane of other surfaces.
+    lifts: Memo<Vec<DVec3>>,
+    /// Key of the last tree over all objects.
+    last: Option<Key>,
+}
+
+impl AccelCache {
+    pub(crate) fn end(&mut self, success: bool, request: u64) {
+        self.trees.end(success, request);
+        self.geometry.end(success, request);
+    }
+
+    pub(crate) fn spares(&self) -> impl Iterator<Item = Spare> {
+        self.trees.spares().chain(self.geometry.spares())
+    }
+
+    pub(crate) fn drop_before(&mut self, request: u64) {
+        self.trees.drop_before(request);
+        self.geometry.drop_before(request);
+    }
+
+    /// The geometry that was built or found last.
+    #[cfg(test)]
+    pub(crate) fn latest(&self) -> Option<&Arc<Geometry>> {
+        self.geometry.latest(&self.last?)
+    }
+}
+
+/// Result of the stage.
+#[derive(Clone)]
+pub(crate) struct Built {
+    /// One for each of the scene's mesh files.
+    pub(crate) meshes: Vec<Arc<MeshTree>>,
+    /// All objects.
+    pub(crate) geometry: Arc<Geometry>,
+}
+
+/// Build what is missing, in coordinates that start at `origin`. `scene` has the overrides in it.
+///
+/// # Errors
+/// Cancelled.
+pub(crate) fn accel(
+    scene: &Scene,
+    (of, origin): (&Referents<'_>, DVec3),
+    meshes: &Meshes,
+    cache: &mut AccelCache,
+    reading: &Reading<'_>,
+) -> Result<Staged<Built>, Stop> {
+    let (meshes, kept) = trees(scene, meshes, cache, reading)?;
+    let lights_key = keys::from(&keys::coplanar(scene, of), origin);
+    let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
+    cache.lifts.set(lights_key, lifts.clone());
+    let key = keys::geometry(scene, of, (origin, &lifts));
+    let is_last = cache.last == Some(key);
+    if let Some(geometry) = cache.geometry.get(&key, key) {
+        cache.last = Some(key);
+        let why = if is_last { "no shape changed" } else { "its trees were kept" };
+        return Ok(Staged::reused(Built { meshes, geometry }, why));
+    }
+    let build = || Geometry::lifted(scene, &meshes, (origin, lifts), reading.token);
+    let geometry = Arc::new(reading.pool.install(build)?);
+    cache.geometry.insert(key, key, (geometry.clone(), geometry.own_memory_bytes()));
+    cache.last = Some(key);
+    let built = meshes.len() - kept;
+    let value = Built { meshes, geometry };
+    Ok(match (scene.objects.is_empty(), kept) {
+        (true, _) => Staged::skipped(value, "the scene has no shape"),
+        (false, 0) => Staged::done(value, ""),
+        (false, _) => {
+            Staged::done(value, format!("{built} mesh trees built, {kept} kept, one over all objects"))
+        }
+    })
+}
+
+/// The trees of all meshes, and how many were kept from before.
+fn trees(
+    scene: &Scene,
+    meshes: &Meshes,
+    cache: &mut AccelCache,
+    reading: &Reading<'_>,
+) -> Result<(Vec<Arc<MeshTree>>, usize), Stop> {
+    let mut kept = 0;
+    let accel = scene.render.accel;
+    let mut trees = Vec::with_capacity(meshes.len());
+    for mesh in meshes {
+        let key = keys::tree(&mesh.key, accel);
+        let tree = match cache.trees.get(&key, key) {
+            Some(tree) => {
+                kept += 1;
+                tree
+            }
+            None => {
+                let loaded = with_lifted_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
+                let build = || MeshTree::build(loaded, accel, reading.token);
+                let tree = Arc::new(reading.pool.install(build)?);
+                // The tree holds its mesh, also when that is read anew.
+                let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();
+                cache.trees.insert(key, key, (tree.clone(), bytes));
+                tree
+            }
+        };
+        trees.push(tree);
+    }
+    Ok((trees, kept))
+}

@@ -1,0 +1,47 @@
+//! Warnings of lights in the plane of other surfaces.
+
+use super::super::cache::Memo;
+use super::super::keys;
+use super::Findings;
+use super::meshes::Meshes;
+use crate::assets::LoadedMesh;
+use crate::math::DVec3;
+use crate::scene::Loaded;
+use crate::scene::description::Object;
+use crate::scene::diagnostic::Severity;
+use crate::scene::fingerprint::Key;
+use crate::world::{Coplanar, coplanar_lights};
+
+/// Most lights that are warned of.
+const MOST: usize = 10;
+
+/// Warns of the lights that are moved off the plane of another surface, unless shapes and lights are as they were.
+pub(crate) fn coplanar(
+    loaded: &Loaded,
+    meshes: &Meshes,
+    memo: &mut Memo<Vec<Coplanar>>,
+    findings: &mut Findings,
+) {
+    let scene = &loaded.scene;
+    let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
+    let key = keys::coplanar(scene, &keys::referents(scene, &mesh_keys, None));
+    let found = memo.get(key).cloned().unwrap_or_else(|| {
+        let files: Vec<&LoadedMesh> = meshes.iter().map(|mesh| &*mesh.mesh).collect();
+        coplanar_lights(scene, &files, DVec3::ZERO)
+    });
+    let named = |number: usize| {
+        let Object { shape, name, span, .. } = &scene.objects[number];
+        let name = name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
+        format!("the {}{name} of line {}", shape.kind(), loaded.line(span))
+    };
+    for of_light in found.chunk_by(|a, b| a.light == b.light).take(MOST) {
+        let [Coplanar { light, surface, .. }, others @ ..] = of_light else { continue };
+        let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
+        let other = if surface == light { "other faces of its file".to_owned() } else { named(*surface) };
+        let message = format!("this light is in the plane of {other}{more}");
+        let help = "it is rendered a hair in front of it; move it off the plane to choose the distance";
+        let span = scene.objects[*light].span.clone();
+        findings.warnings.push(loaded.diagnostic_at(span, Severity::Warning, message, Some(help.to_owned())));
+    }
+    memo.set(key, found);
+}

@@ -1,0 +1,312 @@
+//! The bodies of glass: which of its surfaces are one, and which have holes.
+
+use std::sync::Arc;
+
+use super::super::cache::Memo;
+use super::super::keys;
+use super::meshes::Meshes;
+use super::{Findings, Stop};
+use crate::assets::LoadedMesh;
+use crate::control::CancelToken;
+use crate::scene::Loaded;
+use crate::scene::description::Sheet;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::fingerprint::Key;
+use crate::world::{GlassSolids, OpenGlass};
+
+/// Flaw of the picture where glass is open, under the place of the object.
+const LACKS: &str = "glass refracts where a ray goes in and where it comes out; no ray that comes through the hole \
+                     is refracted or tinted";
+
+/// Finds the bodies, unless shapes and materials are as they were; warns about those that are open.
+///
+/// # Errors
+/// Cancelled.
+pub(crate) fn glass(
+    loaded: &Loaded,
+    meshes: &Meshes,
+    memo: &mut Memo<Arc<GlassSolids>>,
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Arc<GlassSolids>, Stop> {
+    let scene = &loaded.scene;
+    let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
+    let key = keys::glass(scene, &keys::referents(scene, &mesh_keys, None));
+    let bodies = if let Some(bodies) = memo.get(key) {
+        Arc::clone(bodies)
+    } else {
+        let files: Vec<&LoadedMesh> = meshes.iter().map(|mesh| &*mesh.mesh).collect();
+        Arc::new(GlassSolids::find(scene, &files, token)?)
+    };
+    memo.set(key, Arc::clone(&bodies));
+    findings.warnings.extend(warnings_of_open(loaded, bodies.open()));
+    findings.warnings.extend(bodies.flat().iter().map(|&object| warning_of_flat(loaded, object)));
+    Ok(bodies)
+}
+
+/// A flaw that several objects may share: one warning is about all of them.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Flaw {
+    /// A shape that has no inside.
+    Sheet { one: &'static str, several: &'static str, help: &'static str },
+    /// A mesh of which a part is missing.
+    Hole,
+    /// A mesh whose faces disagree about the front.
+    Fronts,
+}
+
+/// Most objects that a warning names.
+const MOST_NAMES: usize = 5;
+
+/// Warnings about glass with holes, one for each flaw, at its first object. Glass whose holes opaque surfaces surround is fine.
+fn warnings_of_open(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
+    let mut groups: Vec<(Flaw, Vec<&OpenGlass>)> = Vec::new();
+    for open in open.iter().filter(|open| !open.is_covered) {
+        let Some(flaw) = flaw(loaded, open) else { continue };
+        match groups.iter_mut().find(|(other, _)| *other == flaw) {
+            Some((_, members)) => members.push(open),
+            None => groups.push((flaw, vec![open])),
+        }
+    }
+    groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
+}
+
+/// The flaw of an open object.
+fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<Flaw> {
+    let shape = &loaded.scene.objects[open.object as usize].shape;
+    if shape.mesh().is_some() {
+        return Some(if open.disagrees { Flaw::Fronts } else { Flaw::Hole });
+    }
+    let sheet = |one, several, help| Flaw::Sheet { one, several, help };
+    Some(match shape.sheet()? {
+        Sheet::Quad(_) => {
+            sheet("a quad", "quads", "use a thin [[box]] for a pane, or close it by other glass")
+        }
+        Sheet::Triangle(_) => sheet("a triangle", "triangles", "use a [[box]], or a closed [[mesh]]"),
+        Sheet::Disk { .. } => sheet("a disk", "disks", "use a flat [[cylinder]] for a round pane"),
+        Sheet::Cylinder { .. } => sheet("an open cylinder", "open cylinders", "close it by `caps = true`"),
+        Sheet::Cone { .. } => sheet("an open cone", "open cones", "close it by `cap = true`"),
+    })
+}
+
+/// The warning about objects with this flaw; there is at least one.
+fn warning(loaded: &Loaded, flaw: Flaw, members: &[&OpenGlass]) -> Diagnostic {
+    let first = &loaded.scene.objects[members[0].object as usize];
+    let edges: usize = members.iter().map(|open| open.edges).sum();
+    let edges = if edges == 1 { "1 edge".to_owned() } else { format!("{edges} edges") };
+    let part = percent(members.iter().map(|open| open.missing).fold(0.0, f64::max));
+    let (count, names) = (members.len(), names(loaded, members));
+    let mesh = match (count, &first.name) {
+        (1, Some(name)) => format!("mesh \"{name}\" of glass is"),
+        (1, None) => "mesh of glass is".to_owned(),
+        (_, _) => format!("{count} meshes of glass are"),
+    };
+    let list = if count == 1 { String::new() } else { format!(": {names}") };
+    let (message, help) = match flaw {
+        Flaw::Sheet { one, help, .. } if count == 1 => (format!("{one} of glass has no inside"), help),
+        Flaw::Sheet { several, help, .. } => {
+            (format!("{count} {several} of glass have no inside{list}"), help)
+        }
+        Flaw::Hole => {
+            let of = if count == 1 { "of its surface" } else { "of a surface" };
+            let message = format!(
+                "{mesh} not closed: {edges} without a neighbour of the same glass, {part} {of} missing{list}"
+            );
+            (message, "close the mesh in the program that made it, or give a pane a thickness")
+        }
+        Flaw::Fronts => {
+            let message = format!("{mesh} inside out in parts: {edges} between two fronts and backs{list}");
+            (message, "let its normals be recalculated, all outwards, in the program that made it")
+        }
+    };
+    let mut diagnostic =
+        loaded.diagnostic_at(first.span.clone(), Severity::Warning, message, Some(help.to_owned()));
+    if let Some(place) = &mut diagnostic.place {
+        place.label = LACKS.to_owned();
+    }
+    diagnostic
+}
+
+/// Names of the first few objects, or else their lines in the file: `"pane", line 12 and 3 more`.
+fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
+    let name = |open: &&OpenGlass| {
+        let object = &loaded.scene.objects[open.object as usize];
+        let line = || format!("line {}", loaded.line(&object.span));
+        object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
+    };
+    // One more takes no more room than the words about it.
+    let most = if members.len() == MOST_NAMES + 1 { MOST_NAMES + 1 } else { MOST_NAMES };
+    let mut shown: Vec<String> = members.iter().take(most).map(name).collect();
+    let last = match members.len() - shown.len() {
+        0 => shown.pop().unwrap_or_default(),
+        more => format!("{more} more"),
+    };
+    if shown.is_empty() { last } else { format!("{} and {last}", shown.join(", ")) }
+}
+
+/// The warning about a closed body that encloses nothing.
+fn warning_of_flat(loaded: &Loaded, object: u32) -> Diagnostic {
+    let object = &loaded.scene.objects[object as usize];
+    let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
+    let message = format!("glass{name} encloses nothing: its faces are there twice, facing both ways");
+    let help = "export each face once, facing outwards (not double-sided)".to_owned();
+    let mut diagnostic = loaded.diagnostic_at(object.span.clone(), Severity::Warning, message, Some(help));
+    if let Some(place) = &mut diagnostic.place {
+        place.label = "rays that come in stay inside: all behind it is tinted".to_owned();
+    }
+    diagnostic
+}
+
+fn percent(part: f64) -> String {
+    match 100.0 * part {
+        percent if percent < 0.1 => "less than 0.1 %".to_owned(),
+        percent if percent < 9.95 => format!("{percent:.1} %"),
+        percent => format!("{percent:.0} %"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::scene::fingerprint::Fingerprint;
+    use crate::stages::meshes::KeptMesh;
+
+    /// The warnings of a scene whose mesh files are this one.
+    fn warnings(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<Diagnostic> {
+        let text = format!(
+            "[materials.a]\ntype = '{material}'\n{text}\n[render]\nambient = [1, 1, 1]\n[camera]\nposition = [0, 1, 4]\n\
+             look_at = [0, 1, 0]\n"
+        );
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, &text).expect("written");
+        std::fs::write(folder.path().join("a.ply"), "").expect("written");
+        let loaded = crate::scene::load(&path, &[]).expect("a scene that is right");
+        let mut findings = Findings::default();
+        let meshes: Meshes = mesh
+            .into_iter()
+            .map(|mesh| {
+                let key = Fingerprint::new("test").finish();
+                Arc::new(KeptMesh::new(Arc::new(mesh), key, Vec::new()))
+            })
+            .collect();
+        let token = CancelToken::new();
+        let found = glass(&loaded, &meshes, &mut Memo::default(), &mut findings, &token);
+        assert!(found.is_ok(), "{text}");
+        let is_right = |one: &Diagnostic| {
+            let place = one.place.as_ref().map(|place| &place.source[place.span.clone()]);
+            one.help.is_some() && place.is_some_and(|place| place.starts_with("[["))
+        };
+        assert!(findings.warnings.iter().all(is_right), "{:?}", findings.warnings);
+        findings.warnings
+    }
+
+    fn messages(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<String> {
+        warnings(text, material, mesh).into_iter().map(|one| one.message).collect()
+    }
+
+    #[test]
+    fn shapes_without_an_inside_are_warned_about() {
+        for (shape, expected) in [
+            ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a quad of glass has no inside"),
+            (
+                "[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 1, 0]",
+                "a triangle of glass has no inside",
+            ),
+            ("[[disk]]", "a disk of glass has no inside"),
+            ("[[cylinder]]\ncaps = false", "an open cylinder of glass has no inside"),
+            ("[[cone]]\ncap = false", "an open cone of glass has no inside"),
+        ] {
+            let shape = format!("{shape}\nmaterial = 'a'");
+            assert_eq!(messages(&shape, "glass", None), [expected]);
+            assert_eq!(messages(&shape, "phong", None), [""; 0], "{shape} that is not of glass");
+        }
+        for closed in [
+            "[[cylinder]]",
+            "[[cone]]",
+            "[[torus]]",
+            "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1",
+            "[[box]]",
+            "[[plane]]",
+            "[[disk]]\nmaterial = 'a'\n[[cone]]\ncap = false",
+        ] {
+            assert_eq!(messages(&format!("{closed}\nmaterial = 'a'"), "glass", None), [""; 0], "{closed}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_with_a_hole_is_named_and_said_how_large_the_hole_is() {
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let all = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let of = |triangles: &[[u32; 3]]| {
+            let mut loaded = LoadedMesh::default();
+            loaded.mesh.positions = positions.clone();
+            loaded.mesh.triangles = triangles.to_vec();
+            Some(loaded)
+        };
+        let text = "[[mesh]]\nname = 'drop'\nfile = 'a.ply'\nmaterial = 'a'";
+        assert_eq!(messages(text, "glass", of(&all)), [""; 0]);
+        // Half an area of 1 of half an area of 3 + √3.
+        let open = "mesh \"drop\" of glass is not closed: 3 edges without a neighbour of the same glass, 27 % of its surface missing";
+        assert_eq!(messages(text, "glass", of(&all[1..])), [open]);
+        assert_eq!(messages(text, "phong", of(&all[1..])), [""; 0]);
+        // One of them looks inwards.
+        let odd = [[0, 1, 2], all[1], all[2], all[3]];
+        let odd = &messages(text, "glass", of(&odd))[..];
+        assert_eq!(
+            odd,
+            ["mesh \"drop\" of glass is inside out in parts: 6 edges between two fronts and backs"]
+        );
+        // Each face twice, facing both ways.
+        let both: Vec<_> = all.iter().flat_map(|&[a, b, c]| [[a, b, c], [a, c, b]]).collect();
+        let twice = "glass \"drop\" encloses nothing: its faces are there twice, facing both ways";
+        assert_eq!(messages(text, "glass", of(&both)), [twice]);
+    }
+
+    #[test]
+    fn open_parts_of_one_kind_share_a_warning_that_names_a_few() {
+        let pane = |i: usize| {
+            let name = if i == 1 { String::new() } else { format!("name = 'pane {i}'\n") };
+            format!("[[quad]]\n{name}corner = [0, {i}, 0]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = 'a'\n")
+        };
+        let panes = |count: usize| (0..count).map(pane).collect::<String>();
+        let of = |count: usize| messages(&panes(count), "glass", None);
+        let five = "\"pane 0\", line 9, \"pane 2\", \"pane 3\"";
+        assert_eq!(of(2), ["2 quads of glass have no inside: \"pane 0\" and line 9"]);
+        assert_eq!(of(5), [format!("5 quads of glass have no inside: {five} and \"pane 4\"")]);
+        assert_eq!(of(6), [format!("6 quads of glass have no inside: {five}, \"pane 4\" and \"pane 5\"")]);
+        assert_eq!(of(30), [format!("30 quads of glass have no inside: {five}, \"pane 4\" and 25 more")]);
+        // Other kinds have warnings of their own.
+        let mixed = format!("[[disk]]\nmaterial = 'a'\n{}", panes(2));
+        assert_eq!(messages(&mixed, "glass", None).len(), 2);
+    }
+
+    #[test]
+    fn parts_of_different_glass_do_not_close_each_other() {
+        let side = |corner: &str, u: &str, v: &str, material: &str| {
+            format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
+        };
+        let (x, y, z) = ("[1, 0, 0]", "[0, 1, 0]", "[0, 0, 1]");
+        let cube = |lid: &str| {
+            [
+                side("[0, 0, 0]", y, x, "a"),
+                side("[0, 0, 0]", z, y, "a"),
+                side("[0, 0, 0]", x, z, "a"),
+                side("[1, 0, 0]", y, z, "a"),
+                side("[0, 1, 0]", z, x, "a"),
+                side("[0, 0, 1]", x, y, lid),
+            ]
+            .concat()
+        };
+        let other = |glass: &str| format!("[materials.b]\ntype = 'glass'\n{glass}\n{}", cube("b"));
+        assert_eq!(messages(&cube("a"), "glass", None), [""; 0]);
+        assert_eq!(messages(&other("ior = 1.5\ntint = [1, 1, 1]"), "glass", None), [""; 0], "the same glass");
+        for glass in ["ior = 1.33", "tint = [0.5, 1, 1]"] {
+            let found = messages(&other(glass), "glass", None);
+            // The lid and its four neighbours.
+            let expected = "5 quads of glass have no inside: ";
+            assert!(found.len() == 1 && found[0].starts_with(expected), "{glass}: {found:?}");
+        }
+    }
+}

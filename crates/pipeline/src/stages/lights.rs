@@ -1,0 +1,86 @@
+//! The lights of a scene, gathered anew when one of them changed.
+
+use std::sync::Arc;
+
+use super::super::cache::Memo;
+use super::super::keys;
+use super::Staged;
+use super::textures::Textures;
+use crate::control::{CancelToken, Cancelled};
+use crate::lights::infinite::EnvironmentMap;
+use crate::lights::{Lights, SamplingMode};
+use crate::scene::description::{Scene, TextureRole};
+use crate::scene::fingerprint::{Key, Referents};
+use crate::world::{self, Geometry, TextureSource};
+
+/// The distribution over the map of an environment, which stays while the file does, however it is turned.
+pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
+
+/// Gather them.
+pub(crate) fn lights(
+    scene: &Scene,
+    of: &Referents<'_>,
+    geometry: &Geometry,
+    textures: &Textures,
+    (memo, skies): (&mut Memo<Arc<Lights>>, &mut SkyMemo),
+    token: &CancelToken,
+) -> Result<Staged<Arc<Lights>>, Cancelled> {
+    let map = textures.environment.as_ref().map(|(key, _)| key);
+    let declared = patterns(scene).filter_map(|source| textures.key_of.get(&source));
+    let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
+    let key = keys::lights(scene, of, (geometry.origin(), geometry.lifts()), (map, &patterns));
+    if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
+        return Ok(Staged::reused(lights.clone(), "no light changed"));
+    }
+    let lights = world::lights(scene, geometry, &textures.images, sky(textures, skies), token)?;
+    memo.set(key, lights.clone());
+    Ok(match lights.len() {
+        0 => Staged::skipped(lights, "the scene has no light"),
+        1 => Staged::done(lights, "1 light"),
+        count => {
+            let are_picked = |receivers| lights.sampler(receivers).is_some();
+            let picked = match (are_picked(SamplingMode::Eye), are_picked(SamplingMode::Paths)) {
+                (true, _) => picked("some are picked", &lights),
+                (false, true) => picked("paths pick some", &lights),
+                (false, false) => String::new(),
+            };
+            Staged::done(lights, format!("{count} lights{picked}"))
+        }
+    })
+}
+
+/// Words for lights that are too many to sample all of them.
+fn picked(by_whom: &str, lights: &Lights) -> String {
+    format!(", of which {by_whom} at a time; their tree has {} kB", lights.memory_bytes().div_ceil(1000))
+}
+
+/// The images that lamps by materials of the scene file have on them.
+fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
+    let shining = scene.materials.iter().filter(|material| material.emits());
+    shining.flat_map(move |material| {
+        let textures = material.textures().into_iter().filter(|(_, role)| match role {
+            TextureRole::Emission | TextureRole::EmissionCoat(_) | TextureRole::Opacity(_) => true,
+            TextureRole::Diffuse
+            | TextureRole::Specular
+            | TextureRole::Ambient
+            | TextureRole::Facets
+            | TextureRole::Roughness(_)
+            | TextureRole::NormalMap
+            | TextureRole::Bump(_) => false,
+        });
+        textures.map(|texture| world::material_source(scene, material, texture))
+    })
+}
+
+fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<EnvironmentMap>> {
+    let Some((key, texels)) = &textures.environment else {
+        *memo = SkyMemo::default();
+        return None;
+    };
+    if let Some(sky) = memo.get(*key) {
+        return sky.clone();
+    }
+    let sky = world::sky(texels);
+    memo.set(*key, sky.clone());
+    sky
+}

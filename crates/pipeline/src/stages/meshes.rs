@@ -1,0 +1,578 @@
+//! Mesh files, several at once, each read only when its content changed.
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use rayon::prelude::*;
+
+use super::super::cache::Pool;
+use super::super::watch::content::{Content, FileRead};
+use super::containers::canonical;
+use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
+use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
+use crate::control::{CancelToken, Cancelled, Progress};
+use crate::scene::description::{MeshFile, Scene, UvSet};
+use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::{Loaded, MeshBounds};
+
+/// A mesh file with the files that it names.
+#[derive(Debug)]
+pub(crate) struct KeptMesh {
+    pub(crate) mesh: Arc<LoadedMesh>,
+    /// All contents that the mesh was made of.
+    pub(crate) key: Key,
+    companions: Vec<FileRead>,
+    /// Bounds of the mesh, once they have been computed.
+    bounds: OnceLock<MeshBounds>,
+}
+
+impl KeptMesh {
+    pub(super) fn new(mesh: Arc<LoadedMesh>, key: Key, companions: Vec<FileRead>) -> Self {
+        Self { mesh, key, companions, bounds: OnceLock::new() }
+    }
+
+    fn bounds(&self) -> MeshBounds {
+        *self.bounds.get_or_init(|| self.mesh.mesh.bounds())
+    }
+}
+
+/// One for each of the scene's mesh files; those that failed are empty.
+pub(crate) type Meshes = Vec<Arc<KeptMesh>>;
+
+/// Load what the scene names. All files are tried; errors go to the findings.
+///
+/// # Errors
+/// Cancelled.
+pub(crate) fn meshes(
+    loaded: &Loaded,
+    cache: &mut Pool<MeshName, KeptMesh>,
+    findings: &mut Findings,
+    reading: &Reading<'_>,
+) -> Result<Staged<Meshes>, Stop> {
+    let files = &loaded.scene.mesh_files;
+    if files.is_empty() {
+        return Ok(Staged::skipped(Vec::new(), "the scene has no mesh"));
+    }
+    let before: Vec<(Content, Option<Arc<KeptMesh>>)> = files
+        .iter()
+        .map(|file| {
+            let name = name(file);
+            let content = reading.contents.read(&file.value, reading.token)?;
+            if let Some(last) = cache.latest(&name) {
+                // What it named last time it most likely names again: hashed before it is read.
+                companions(&last.companions, reading)?;
+            }
+            Ok((content, cache.get(&name, file_key(file, content))))
+        })
+        .collect::<Result<_, Cancelled>>()?;
+    let assets: Vec<Asset<KeptMesh>> = reading.pool.install(|| {
+        files
+            .par_iter()
+            .zip(before)
+            .map(|(file, (content, kept))| {
+                let load = |_: &Path, progress: Progress<'_>, token: &CancelToken| {
+                    reading.containers.mesh((&file.value, file.part), progress, token)
+                };
+                one(file, content, kept, reading, load)
+            })
+            .collect::<Result<_, _>>()
+    })?;
+    let mut meshes = Vec::new();
+    let mut counts = Counts::default();
+    let mut warnings = Warnings::default();
+    let own_materials = with_own_materials(&loaded.scene);
+    for ((file, asset), uses_own) in files.iter().zip(assets).zip(own_materials) {
+        let content = asset.files[0].content;
+        asset.files.into_iter().for_each(|file| findings.read(file));
+        let mesh = match asset.result {
+            Ok((mesh, was_kept)) => {
+                counts.kept += usize::from(was_kept);
+                counts.loaded += usize::from(!was_kept);
+                warnings.add(file, &mesh.mesh, uses_own);
+                let bytes = mesh.mesh.mesh.memory_bytes();
+                cache.insert(name(file), file_key(file, content), (mesh.clone(), bytes));
+                mesh
+            }
+            Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
+            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(error) => {
+                counts.failed += 1;
+                findings.asset_error(loaded, file.span.clone(), &error);
+                let key = file_key(file, content);
+                Arc::new(KeptMesh::new(Arc::default(), key, Vec::new()))
+            }
+        };
+        meshes.push(mesh);
+    }
+    warn(loaded, warnings.describe_error(), findings);
+    for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
+        if let Some(mesh) = object.shape.mesh()
+            && meshes[mesh.file].mesh.lacks_materials()
+        {
+            let name = files[mesh.file].value.display();
+            let message = format!("[[mesh]] needs `material`: {name} has no materials of its own");
+            let help = "add a line such as `material = \"name\"`";
+            findings.error(loaded, object.span.clone(), message, help);
+        }
+    }
+    warn_about_missing_parts(loaded, files, &meshes, findings);
+    if counts.failed == 0 {
+        let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
+        findings.warnings.extend(loaded.lights_facing_away(bounds));
+    }
+    Ok(loaded_and_kept(meshes, counts))
+}
+
+/// Warns about objects whose keys and materials ask for parts that their mesh files lack. Files that were not read lack nothing.
+fn warn_about_missing_parts(
+    loaded: &Loaded,
+    files: &[MeshFile],
+    meshes: &[Arc<KeptMesh>],
+    findings: &mut Findings,
+) {
+    for object in &loaded.scene.objects {
+        let Some(mesh) = object.shape.mesh() else { continue };
+        let (file, read) = (files[mesh.file].value.display(), &meshes[mesh.file].mesh.mesh);
+        if read.positions.is_empty() {
+            continue;
+        }
+        let material = object.material.map(|material| &loaded.scene.materials[material]);
+        let mut warn = |message| findings.warn(loaded, object.span.clone(), message);
+        if mesh.vertex_colors && read.colors.is_empty() {
+            warn(format!("`vertex_colors` changes nothing: the vertices of {file} have no colours"));
+        } else if let Some(material) = material.filter(|own| mesh.vertex_colors && !own.kind.has_color()) {
+            let name = &material.name;
+            warn(format!("`vertex_colors` changes nothing: \"{name}\" has no colour that they multiply"));
+        }
+        let Some(material) = material else { continue };
+        let name = &material.name;
+        let textures = &loaded.scene.textures;
+        let is_second = |(texture, _): &(usize, _)| textures[*texture].uv == UvSet::Second;
+        if let Some((texture, _)) = material.textures().into_iter().find(is_second)
+            && read.second_uvs.is_empty()
+        {
+            let texture = &textures[texture].name;
+            warn(format!(
+                "{file} has no second set of texture coordinates: \"{texture}\" of \"{name}\" takes the first"
+            ));
+        }
+        if !read.uvs.is_empty() {
+            continue;
+        }
+        if material.kind.has_direction() {
+            warn(format!(
+                "{file} has no texture coordinates: the `anisotropy` of \"{name}\" has no direction there"
+            ));
+        }
+        if !material.textures().is_empty() {
+            warn(format!(
+                "{file} has no texture coordinates: each triangle shows half of the textures of \"{name}\""
+            ));
+        }
+    }
+}
+
+/// A mesh file and the number of its part, however the scene spells it.
+pub(crate) type MeshName = (PathBuf, Option<u32>);
+
+fn name(file: &MeshFile) -> MeshName {
+    (canonical(&file.value), file.part)
+}
+
+/// One file of this content: from before if it and all that it names are as they were.
+fn one(
+    file: &MeshFile,
+    content: Content,
+    kept: Option<Arc<KeptMesh>>,
+    reading: &Reading<'_>,
+    load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
+) -> Result<Asset<KeptMesh>, Cancelled> {
+    let path = &file.value;
+    let mut files = vec![FileRead { path: path.to_owned(), content }];
+    if let Some(mesh) = kept
+        && mesh.companions == companions(&mesh.companions, reading)?
+    {
+        files.extend(mesh.companions.iter().cloned());
+        return Ok(Asset { files, result: Ok((mesh, true)) });
+    }
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let read = || reading.sink.asset(&name, |progress| load(path, progress, reading.token));
+    let mut loaded = read();
+    if let Ok(mesh) = &loaded
+        && has_appeared(&mesh.companions, reading)?
+    {
+        loaded = read();
+    }
+    let result = match loaded {
+        Ok(mesh) => {
+            let content = reading.contents.decoded(path, mesh.hash);
+            files[0].content = content;
+            let read = |companion| reading.contents.of_companion(companion, reading.token);
+            let companions = mesh.companions.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+            files.extend(companions.iter().cloned());
+            let mut key = Fingerprint::new("mesh");
+            key.key(&file_key(file, content));
+            for file in &companions {
+                file.content.add_to(key.path(&file.path));
+            }
+            Ok((Arc::new(KeptMesh::new(Arc::new(mesh), key.finish(), companions)), false))
+        }
+        Err(error) => Err(error),
+    };
+    Ok(Asset { files, result })
+}
+
+/// Whether a file that could not be read can be read now, and this request did not know of it before.
+fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
+    for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
+        let is_new = reading.contents.known(&companion.path).is_none();
+        let content = reading.contents.read(&companion.path, reading.token)?;
+        if is_new && matches!(content, Content::Hash(_)) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// These files as they are now.
+fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>, Cancelled> {
+    let now = |file: &FileRead| {
+        let content = reading.contents.read(&file.path, reading.token)?;
+        Ok(FileRead { path: file.path.clone(), content })
+    };
+    files.iter().map(now).collect()
+}
+
+fn file_key(file: &MeshFile, content: Content) -> Key {
+    let mut key = Fingerprint::new("file");
+    content.add_to(key.path(&file.value).index(file.part.map_or(0, |part| part as usize + 1)));
+    key.finish()
+}
+
+/// Whether an object shows the file's own materials, for each mesh file.
+fn with_own_materials(scene: &Scene) -> Vec<bool> {
+    let mut shown = vec![false; scene.mesh_files.len()];
+    let plain = scene.objects.iter().filter(|object| object.material.is_none());
+    plain.filter_map(|object| object.shape.mesh()).for_each(|mesh| shown[mesh.file] = true);
+    shown
+}
+
+/// Warnings about mesh files, each said once. The faces that parts of a file leave out are counted together.
+#[derive(Default)]
+struct Warnings<'a> {
+    all: Vec<(&'a MeshFile, Warning)>,
+    /// Place in the list of the faces that a file leaves out.
+    dropped: HashMap<&'a Path, usize>,
+    known: HashSet<String>,
+}
+
+enum Warning {
+    /// Faces left out by so many parts.
+    Dropped(Dropped, usize),
+    Words(String),
+}
+
+impl<'a> Warnings<'a> {
+    /// Adds those of a file. Those about its own materials count only if an object shows these.
+    fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
+        if mesh.dropped != Dropped::default() {
+            let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
+            match self.all.get_mut(place) {
+                Some((_, Warning::Dropped(all, parts))) => {
+                    all.non_finite += mesh.dropped.non_finite;
+                    all.degenerate += mesh.dropped.degenerate;
+                    *parts += 1;
+                }
+                Some((_, Warning::Words(_))) | None => {
+                    self.all.push((file, Warning::Dropped(mesh.dropped, 1)));
+                }
+            }
+        }
+        let of_materials = mesh.material_warnings.iter().filter(move |_| uses_own);
+        for said in mesh.warnings.iter().chain(of_materials) {
+            let words = format!("{}: {said}", file.value.display());
+            if self.known.insert(words.clone()) {
+                self.all.push((file, Warning::Words(words)));
+            }
+        }
+    }
+
+    fn describe_error(self) -> Vec<(&'a MeshFile, String)> {
+        let words = |(file, warning): (&'a MeshFile, Warning)| {
+            let words = match warning {
+                Warning::Words(words) => words,
+                Warning::Dropped(faces, parts) => {
+                    let of_parts = if parts > 1 { format!(" in {parts} parts") } else { String::new() };
+                    format!("{}: {}{of_parts}", file.value.display(), dropped(&faces)?)
+                }
+            };
+            Some((file, words))
+        };
+        self.all.into_iter().filter_map(words).collect()
+    }
+}
+
+/// Most warnings of all mesh files.
+const MOST_WARNINGS: usize = 100;
+
+fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
+    let unsaid = warnings.len().saturating_sub(MOST_WARNINGS);
+    let last = warnings.last().map(|(file, _)| file.span.clone());
+    for (file, message) in warnings.into_iter().take(MOST_WARNINGS) {
+        findings.warn(loaded, file.span.clone(), message);
+    }
+    if let Some(span) = last.filter(|_| unsaid > 0) {
+        let s = if unsaid == 1 { "" } else { "s" };
+        findings.warn(loaded, span, format!("{unsaid} more warning{s} of mesh files"));
+    }
+}
+
+/// The faces that were left out, in words.
+fn dropped(faces: &Dropped) -> Option<String> {
+    let count = |number: u64, what: &str| {
+        (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))
+    };
+    let parts: Vec<String> =
+        [count(faces.non_finite, "with non-finite coordinates"), count(faces.degenerate, "without area")]
+            .into_iter()
+            .flatten()
+            .collect();
+    (!parts.is_empty()).then(|| format!("left out {}", parts.join(" and ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::containers::Containers;
+    use super::*;
+    use crate::sink::Sink;
+    use crate::watch::content::{Contents, Snapshot};
+
+    const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
+
+    /// A folder with a mesh and its material, and what reads them.
+    struct Desk {
+        folder: tempfile::TempDir,
+        sink: Sink,
+        pool: rayon::ThreadPool,
+        cache: Pool<MeshName, KeptMesh>,
+        contents: Arc<Contents>,
+    }
+
+    impl Desk {
+        fn new() -> Self {
+            let folder = tempfile::tempdir().expect("a scratch folder");
+            let events = std::sync::mpsc::channel().0;
+            let sink = Sink { generation: 0, events, previews: Default::default(), within: None };
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
+            let desk = Self { folder, sink, pool, cache: Pool::default(), contents: Arc::default() };
+            desk.write("a.obj", OBJ);
+            desk.write("a.mtl", "newmtl m\nKd 1 0 0\n");
+            desk
+        }
+
+        fn write(&self, name: &str, text: &str) {
+            std::fs::write(self.folder.path().join(name), text).expect("written");
+        }
+
+        fn snapshot(&self) -> Snapshot {
+            Snapshot::of(self.contents.clone())
+        }
+
+        fn hash(&self, name: &str) -> Content {
+            let path = self.folder.path().join(name);
+            Contents::default().read(&path, &CancelToken::new()).expect("not cancelled")
+        }
+
+        /// Requests `a.obj` with the files of this snapshot: returns the mesh and the files with their contents.
+        fn read(&mut self, contents: &Snapshot) -> (Arc<KeptMesh>, Vec<FileRead>) {
+            let (meshes, findings) = self.find("[[mesh]]\nfile = \"a.obj\"\n", contents);
+            assert!(findings.errors.is_empty(), "{:?}", findings.errors);
+            (meshes[0].clone(), findings.files)
+        }
+
+        /// The meshes of a scene with these tables.
+        fn find(&mut self, tables: &str, contents: &Snapshot) -> (Meshes, Findings) {
+            let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
+            self.write("scene.toml", &format!("{tables}{camera}"));
+            let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
+            let token = CancelToken::new();
+            let reading = Reading {
+                sink: &self.sink,
+                token: &token,
+                contents,
+                pool: &self.pool,
+                containers: &Containers::default(),
+            };
+            let mut findings = Findings::default();
+            let meshes = meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
+            (meshes.value, findings)
+        }
+    }
+
+    #[test]
+    fn what_a_files_own_materials_lack_is_said_where_they_are_shown() {
+        let mut desk = Desk::new();
+        desk.write("a.obj", &OBJ.replace("usemtl m\n", "f 1 3 2\nusemtl none\n"));
+        let mut said = |tables: &str| {
+            let snapshot = desk.snapshot();
+            desk.find(tables, &snapshot).1.warnings.len()
+        };
+        let own = "[[mesh]]\nfile = \"a.obj\"\n";
+        let given = format!("[materials.red]\n{own}material = \"red\"\n");
+        assert_eq!([said(own), said(&given), said(&format!("{given}{own}"))], [1, 0, 1]);
+    }
+
+    #[test]
+    fn a_light_that_shines_away_from_every_mesh_is_said() {
+        let mut desk = Desk::new();
+        let mut said = |lamp: &str, place: &str| {
+            let lamp =
+                format!("[materials.lamp]\nemission = [5, 5, 5]\n[[quad]]\nmaterial = \"lamp\"\n{lamp}");
+            let tables = format!("{lamp}\n[[mesh]]\nfile = \"a.obj\"\n{place}\n");
+            let snapshot = desk.snapshot();
+            let warnings = desk.find(&tables, &snapshot).1.warnings;
+            for warning in &warnings {
+                let place = warning.place.as_ref().expect("a place");
+                assert!(warning.message.contains("shines away") && place.label == "all shapes are behind it");
+                assert!(tables[place.span.start..].starts_with("[[quad]]"), "{warning:?}");
+            }
+            warnings.len()
+        };
+        // The triangle is from y = 0 to y = 1, the camera at y = 0.
+        let above_up = "corner = [-1, 2, -1]\nu = [0, 0, 2]\nv = [2, 0, 0]";
+        let above_down = "corner = [-1, 2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
+        let below_down = "corner = [-1, -2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
+        for (lamp, place, count) in [
+            (above_up, "", 1),
+            (above_down, "", 0),
+            (below_down, "", 1),
+            (above_up, "translate = [0, 3, 0]", 0),
+            (above_up, "scale = [1, 4, 1]", 0),
+            // Lying on its back, and upside down.
+            (above_up, "scale = [1, 4, 1]\nrotate = [90, 0, 0]", 1),
+            (below_down, "rotate = [180, 0, 0]", 1),
+            (below_down, "rotate = [180, 0, 0]\ntranslate = [0, -1.5, 0]", 0),
+            // What the camera sees is meant.
+            (above_down, "translate = [0, 3, 0]", 0),
+        ] {
+            assert_eq!(said(lamp, place), count, "{lamp}\n{place}");
+        }
+    }
+
+    #[test]
+    fn warnings_are_a_hundred_at_most() {
+        let mut desk = Desk::new();
+        let names: String = (0..102).map(|name| format!("usemtl x{name}\nf 1 2 3\n")).collect();
+        desk.write("a.obj", &OBJ.replace("usemtl m\n", &names));
+        let snapshot = desk.snapshot();
+        let warnings = desk.find("[[mesh]]\nfile = \"a.obj\"\n", &snapshot).1.warnings;
+        assert_eq!(warnings.len(), MOST_WARNINGS + 1);
+        assert_eq!(warnings[MOST_WARNINGS].message, "2 more warnings of mesh files");
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_looked_at_is_not_taken_for_the_new_one() {
+        let mut desk = Desk::new();
+        let old = desk.hash("a.obj");
+        desk.read(&desk.snapshot());
+        // The request has hashed the file, then it changes, then the request goes on.
+        let snapshot = desk.snapshot();
+        snapshot.read(&desk.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
+        desk.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
+        let (mesh, files) = desk.read(&snapshot);
+        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "kept from before");
+        assert_eq!(snapshot.changed(), None);
+        desk.cache = Pool::default();
+        let (mesh, files) = desk.read(&snapshot);
+        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, desk.hash("a.obj")), "decoded");
+        assert_eq!(snapshot.changed(), Some(desk.folder.path().join("a.obj")), "the request starts again");
+        let (mesh, files) = desk.read(&desk.snapshot());
+        assert_eq!(mesh.mesh.mesh.triangles.len(), 2);
+        assert_eq!(files[0].content, desk.hash("a.obj"));
+    }
+
+    #[test]
+    fn a_material_that_changes_after_it_was_read_is_not_taken_for_the_new_one() {
+        let desk = Desk::new();
+        let path = desk.folder.path().join("a.obj");
+        let file = MeshFile { value: path, span: 0..0, part: None };
+        let snapshot = desk.snapshot();
+        let token = CancelToken::new();
+        let reading = Reading {
+            sink: &desk.sink,
+            token: &token,
+            contents: &snapshot,
+            pool: &desk.pool,
+            containers: &Containers::default(),
+        };
+        let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
+            let mesh = crate::assets::mesh::load(path, progress, token);
+            desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
+            mesh
+        };
+        let old = desk.hash("a.mtl");
+        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+        let mesh = asset.result.expect("a mesh").0;
+        assert_eq!((asset.files[1].content, mesh.mesh.materials[0].diffuse.x), (old, 1.0));
+    }
+
+    #[test]
+    fn a_material_file_that_appears_after_it_was_missed_is_read() {
+        let desk = Desk::new();
+        std::fs::remove_file(desk.folder.path().join("a.mtl")).expect("removed");
+        let path = desk.folder.path().join("a.obj");
+        let file = MeshFile { value: path, span: 0..0, part: None };
+        let snapshot = desk.snapshot();
+        let token = CancelToken::new();
+        let reading = Reading {
+            sink: &desk.sink,
+            token: &token,
+            contents: &snapshot,
+            pool: &desk.pool,
+            containers: &Containers::default(),
+        };
+        let load_and_appear = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
+            let mesh = crate::assets::mesh::load(path, progress, token);
+            desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
+            mesh
+        };
+        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
+        let mesh = asset.result.expect("a mesh").0;
+        assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
+        assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0);
+    }
+
+    #[test]
+    fn a_warning_about_many_parts_of_a_file_is_said_once() {
+        let part = |part| MeshFile { value: PathBuf::from("a.glb"), part: Some(part), span: 0..0 };
+        let (files, other) =
+            ([part(0), part(1), part(2)], MeshFile { value: "b.ply".into(), part: None, span: 0..0 });
+        let mesh = |degenerate, warning: &str| LoadedMesh {
+            dropped: Dropped { non_finite: 0, degenerate },
+            warnings: vec![warning.to_owned()],
+            ..LoadedMesh::default()
+        };
+        let mut warnings = Warnings::default();
+        files.iter().for_each(|file| warnings.add(file, &mesh(149, "odd"), true));
+        warnings.add(&other, &mesh(1, "odd"), true);
+        let said: Vec<String> = warnings.describe_error().into_iter().map(|(_, said)| said).collect();
+        let expected = [
+            "a.glb: left out 447 faces without area in 3 parts",
+            "a.glb: odd",
+            "b.ply: left out 1 face without area",
+            "b.ply: odd",
+        ];
+        assert_eq!(said, expected);
+    }
+
+    #[test]
+    fn dropped_faces_are_counted_in_words() {
+        assert_eq!(dropped(&Dropped::default()), None);
+        let some = Dropped { non_finite: 1, degenerate: 12 };
+        assert_eq!(
+            dropped(&some).as_deref(),
+            Some("left out 1 face with non-finite coordinates and 12 faces without area")
+        );
+    }
+}

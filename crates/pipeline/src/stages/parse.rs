@@ -1,0 +1,254 @@
+//! The scene file, and the orbiter file that holds its camera.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::super::cache::Memo;
+use super::super::model::{self, ModelText, Show};
+use super::super::protocol::Failure;
+use super::super::watch::content::{Content, FileRead, Snapshot};
+use super::containers::Containers;
+use super::{Findings, Staged, Stop};
+use crate::assets::gltf::{files_named, is_gltf};
+use crate::assets::mesh::load as load_mesh;
+use crate::assets::orbiter::load as load_orbiter;
+use crate::assets::{AssetError, OrbiterCamera};
+use crate::control::{CancelToken, Cancelled, ignore_progress};
+use crate::output::held::{self, Held};
+use crate::scene;
+use crate::scene::description::Camera;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::is_model;
+use crate::scene::sanitize::visible;
+
+/// A scene that was understood.
+#[derive(Debug)]
+pub(crate) struct Parsed {
+    pub(crate) loaded: Arc<scene::Loaded>,
+    pub(crate) orbiter: Option<OrbiterCamera>,
+    /// Files that the scene file names, and those that these name, where the call sets anything.
+    pub(crate) named: Vec<PathBuf>,
+    /// Files that a model's scene was made of, beside the model.
+    companions: Vec<FileRead>,
+    /// Approximations of a model's scene.
+    notes: Vec<Diagnostic>,
+    orbiter_content: Option<Content>,
+}
+
+/// What the call asks for.
+#[derive(Clone, Copy)]
+pub(crate) struct Origin<'a> {
+    /// The scene file, or a model.
+    pub(crate) path: &'a Path,
+    /// Values in place of the scene's.
+    pub(crate) sets: &'a [String],
+    /// How a model is shown.
+    pub(crate) show: Show,
+}
+
+/// The scene of a model, and the other files that it is made of.
+fn model_scene(
+    Origin { path, sets, show }: Origin<'_>,
+    (contents, containers): (&Snapshot, &Containers),
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<(scene::Loaded, ModelText), Stop> {
+    let made = model::text(path, show, containers, token).map_err(|error| match error {
+        AssetError::Cancelled(_) => Stop::Cancelled,
+        AssetError::OutOfMemory { .. } => Stop::work(error),
+        AssetError::Unreadable { path, reason } => {
+            // A file that is missing is watched, so that its coming is noticed.
+            if let Ok(content) = contents.read(&path, token) {
+                findings.read(FileRead { path: path.clone(), content });
+            }
+            broken(&path, format!("cannot read it: {reason}"))
+        }
+        AssetError::Malformed { path, line, reason } => {
+            let line = line.map_or(String::new(), |line| format!("line {line}: "));
+            broken(&path, format!("{line}{reason}"))
+        }
+    })?;
+    let loaded = scene::load_made(made.text.as_str().into(), path, sets);
+    let loaded = loaded.map_err(|errors| {
+        let shown = |one: Diagnostic| if one.path == path { model::in_its_scene(one) } else { one };
+        Stop::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
+    })?;
+    Ok((loaded, made))
+}
+
+fn broken(path: &Path, message: String) -> Stop {
+    Stop::Failed(Failure::Scene(vec![of_file(path, Severity::Error, message)]))
+}
+
+/// A diagnostic about a whole file.
+fn of_file(path: &Path, severity: Severity, message: String) -> Diagnostic {
+    Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
+}
+
+/// Read and validate the scene, with what the call sets in it.
+///
+/// # Errors
+/// All errors of the scene file.
+pub(crate) fn parse(
+    origin: Origin<'_>,
+    (contents, containers): (&Snapshot, &Containers),
+    memo: &mut Memo<Arc<Parsed>>,
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Staged<Arc<Parsed>>, Stop> {
+    let Origin { path, show, .. } = origin;
+    if let Held::Differs(held) = held::recover(path) {
+        let help =
+            Some("compare both, save what you need as the scene, and remove the other file".to_owned());
+        findings.warnings.push(Diagnostic { help, ..of_file(path, Severity::Warning, held::words(&held)) });
+    }
+    let content = contents.read(path, token)?;
+    let is_model = is_model(path);
+    if !is_model && (show.from.is_some() || show.up.is_some()) {
+        findings.read(FileRead { path: path.to_owned(), content });
+        let message = match show.from {
+            Some(_) => "--from is for models: a scene has its own camera",
+            None => "--up is for models: in a scene y is up",
+        };
+        return Err(Stop::Failed(Failure::Scene(vec![of_file(
+            Path::new(""),
+            Severity::Error,
+            message.to_owned(),
+        )])));
+    }
+    let key = |content| key(origin, content, is_model);
+    // A model is made of more than one file: each of them must be as it was.
+    let is_same = |parsed: &&Arc<Parsed>| {
+        let now =
+            |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
+        parsed.companions.iter().all(now)
+    };
+    let known = memo.get(key(content)).filter(is_same).cloned();
+    let (loaded, content, companions, notes) = match &known {
+        Some(parsed) => (parsed.loaded.clone(), content, parsed.companions.clone(), parsed.notes.clone()),
+        None => {
+            // Until it was understood; then its content is that of the bytes that were.
+            findings.read(FileRead { path: path.to_owned(), content });
+            read(origin, (contents, containers), memo.latest(), findings, token)?
+        }
+    };
+    findings.read_instead(FileRead { path: path.to_owned(), content });
+    companions.iter().for_each(|file| findings.read(file.clone()));
+    let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
+    findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
+    if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
+        return Ok(Staged::reused(parsed, "the scene is as it was"));
+    }
+    let named = named(&loaded);
+    let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
+    // A camera that could not be read is tried again by the next request.
+    if parsed.orbiter.is_some() == orbiter_content.is_some() {
+        memo.set(key(content), parsed.clone());
+    }
+    Ok(Staged::done(parsed, ""))
+}
+
+/// A scene with the content of its file, the other files that it was made of, and approximations.
+type Read = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
+
+fn read(
+    origin: Origin<'_>,
+    (contents, containers): (&Snapshot, &Containers),
+    last: Option<&Arc<Parsed>>,
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Read, Stop> {
+    let Origin { path, sets, .. } = origin;
+    if !is_model(path) {
+        let loaded = scene::load(path, sets)
+            .map_err(|errors| Stop::Failed(Failure::Scene(with_new_name(errors, path, last))))?;
+        let content = contents.decoded(path, *blake3::hash(loaded.source.text().as_bytes()).as_bytes());
+        return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
+    }
+    let (loaded, made) = model_scene(origin, (contents, containers), findings, token)?;
+    let content = contents.decoded(path, made.hash);
+    let companions = made.companions.iter().map(|companion| contents.of_companion(companion, token));
+    let companions = companions.collect::<Result<_, Cancelled>>()?;
+    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
+    Ok((Arc::new(loaded), content, companions, notes))
+}
+
+/// Key of a scene whose file has this content.
+fn key(Origin { path, sets, show }: Origin<'_>, content: Content, is_model: bool) -> Key {
+    let mut key = Fingerprint::new("parse");
+    content.add_to(key.path(path));
+    sets.iter().for_each(|set| {
+        key.text(set);
+    });
+    if is_model {
+        show.add_to(&mut key);
+    }
+    key.finish()
+}
+
+/// Adds to the error about a missing scene the name of a file that has the text of the last good one.
+fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Parsed>>) -> Vec<Diagnostic> {
+    let last = last.filter(|last| last.loaded.path == path);
+    if let [error] = &mut errors[..]
+        && scene::is_absence(error)
+        && let Some(last) = last
+        && let Some(file) = scene::same_text_beside(path, &last.loaded.source.shared_text())
+    {
+        let name = visible(&file.to_string_lossy()).into_owned();
+        error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));
+    }
+    errors
+}
+
+/// Files of the scene without the call's changes, with the files and pictures that only its unread meshes name.
+fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
+    let mut named = loaded.named.clone();
+    let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
+    // What cannot be read names nothing that could be known.
+    for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
+        if let Ok(mesh) = load_mesh(path, &ignore_progress, &CancelToken::new()) {
+            named.extend(mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures));
+        }
+    }
+    let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
+    for path in textures.into_iter().chain(&loaded.named).filter(|path| is_gltf(path) && !is_read(path)) {
+        named.extend(files_named(path).unwrap_or_default());
+    }
+    named
+}
+
+fn has_material_files(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("obj"))
+}
+
+type Orbiter = (Option<OrbiterCamera>, Option<Content>);
+
+/// The orbiter file of a camera that has one; its errors go to the findings.
+fn orbiter(
+    loaded: &scene::Loaded,
+    known: Option<&Parsed>,
+    contents: &Snapshot,
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Orbiter, Stop> {
+    let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
+    let content = contents.read(&file.value, token)?;
+    if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
+        findings.read(FileRead { path: file.value.clone(), content });
+        return Ok((parsed.orbiter, Some(content)));
+    }
+    match load_orbiter(&file.value) {
+        Ok((camera, hash)) => {
+            let content = contents.decoded(&file.value, hash);
+            findings.read(FileRead { path: file.value.clone(), content });
+            Ok((Some(camera), Some(content)))
+        }
+        Err(error) => {
+            findings.read(FileRead { path: file.value.clone(), content });
+            findings.asset_error(loaded, file.span.clone(), &error);
+            Ok((None, Some(content)))
+        }
+    }
+}

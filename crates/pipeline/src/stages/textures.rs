@@ -1,0 +1,622 @@
+//! Image files that visible materials look up, several at once, each decoded only when its content changed.
+
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::super::cache::{Pool, Spare};
+use super::super::watch::content::{Content, FileRead};
+use super::containers::{ImageInput, canonical};
+use super::meshes::Meshes;
+use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
+use crate::assets::AssetError;
+use crate::assets::image::{
+    ColorCurve, ImageEncoding, ImageLimits, ImageWithin, LoadedImage, coverage, load_hashed, load_within,
+    mipmaps, size, size_within,
+};
+use crate::control::{Cancelled, Progress};
+use crate::materials::Mipmaps;
+use crate::materials::texels::{TexelData, Texels};
+use crate::math::Vec3;
+use crate::scene::description::{Channel, Encoding, PixelValue, Scene, TextureRole};
+use crate::scene::diagnostic::Severity;
+use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::{Loaded, is_model};
+use crate::world::{
+    Cutoff, Image, Images, NeededTexture, TextureNeeds, TextureSource, environment_source, textures_needed,
+};
+
+/// Most bytes that the texels of a scene's images may take together.
+const MOST_BYTES: u64 = 2 << 30;
+
+/// A file and the reading of its numbers, however the scene spells it.
+type Name = (PathBuf, Option<u32>, ImageEncoding, Option<Cutoff>);
+
+fn name(source: &TextureSource) -> Name {
+    (canonical(&source.path), source.image, source.encoding, source.coverage)
+}
+
+/// Decoded texels, and warnings about parts of the file that were ignored.
+#[derive(Clone, Debug)]
+struct Decoded {
+    texels: Arc<Texels>,
+    warnings: Vec<String>,
+}
+
+/// The cache of textures: one entry for each file and reading of its numbers, and one for its mipmap levels if a material uses
+/// them.
+#[derive(Debug, Default)]
+pub(crate) struct TextureCache {
+    texels: Pool<Name, Decoded>,
+    mipmaps: Pool<Name, Mipmaps>,
+    /// For images of glTF files that are in files of their own: these files.
+    linked: HashMap<Name, PathBuf>,
+}
+
+impl TextureCache {
+    /// Whether all of these were loaded before, whatever their files hold now.
+    fn has_all(&self, needed: &[NeededTexture]) -> bool {
+        needed.iter().all(|one| self.texels.latest(&name(&one.source)).is_some())
+    }
+
+    pub(crate) fn end(&mut self, success: bool, request: u64) {
+        self.texels.end(success, request);
+        self.mipmaps.end(success, request);
+    }
+
+    pub(crate) fn spares(&self) -> impl Iterator<Item = Spare> {
+        self.texels.spares().chain(self.mipmaps.spares())
+    }
+
+    pub(crate) fn drop_before(&mut self, request: u64) {
+        self.texels.drop_before(request);
+        self.mipmaps.drop_before(request);
+        let texels = &self.texels;
+        self.linked.retain(|name, _| texels.latest(name).is_some());
+    }
+
+    /// The texels of a file that were read last.
+    #[cfg(test)]
+    pub(crate) fn latest(&self, path: &Path) -> Option<&Arc<Texels>> {
+        let name = (canonical(path), None, ImageEncoding::Color, None);
+        self.texels.latest(&name).map(|decoded| &decoded.texels)
+    }
+}
+
+/// The requested textures, without those that failed.
+#[derive(Debug, Default)]
+pub(crate) struct Textures {
+    pub(crate) images: Images,
+    /// Key of each image.
+    pub(crate) key_of: HashMap<TextureSource, Key>,
+    /// Key of each texture, in the order of the requests.
+    pub(crate) keys: Vec<Key>,
+    /// Keys of the textures that materials of mesh files name.
+    pub(crate) of_files: Vec<Key>,
+    /// The map of the environment, with its key.
+    pub(crate) environment: Option<(Key, Arc<Texels>)>,
+    /// Texels read from files by this request.
+    pub(crate) texels_loaded: u64,
+    /// Bytes that all images take, with their levels.
+    pub(crate) memory_bytes: u64,
+}
+
+/// The textures that a picture needs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Needed {
+    pub(crate) textures: Vec<NeededTexture>,
+    /// Number of other textures, which the scene shows and this view does not look up.
+    pub(crate) left_out: usize,
+    /// Whether the call is to see each of them: a model is else shown without those that cannot be read.
+    pub(crate) are_required: bool,
+}
+
+/// The textures that visible materials of this scene look up in a picture. Those of other pictures stay where all of them
+/// were loaded before: lights and trees over them then stay too.
+pub(crate) fn needed(
+    loaded: &Loaded,
+    meshes: &Meshes,
+    lookups: TextureNeeds,
+    cache: &TextureCache,
+) -> Needed {
+    let meshes: Vec<_> = meshes.iter().map(|kept| kept.mesh.clone()).collect();
+    let all = textures_needed(&loaded.scene, &meshes, TextureNeeds::ALL);
+    let of_picture = textures_needed(&loaded.scene, &meshes, lookups);
+    let left_out = all.len() - of_picture.len();
+    if left_out == 0 || cache.has_all(&all) {
+        return Needed { textures: all, ..Needed::default() };
+    }
+    Needed { textures: of_picture, left_out, ..Needed::default() }
+}
+
+/// One image with all who ask for it.
+struct Wanted<'a> {
+    name: Name,
+    content: Content,
+    /// The file of its own that an image of a glTF file has.
+    linked: Option<FileRead>,
+    kept: Kept,
+    asked_by: Vec<&'a NeededTexture>,
+}
+
+/// Cached parts of an image.
+#[derive(Debug, Default)]
+struct Kept {
+    texels: Option<Arc<Decoded>>,
+    mipmaps: Option<Arc<Mipmaps>>,
+}
+
+/// Load these. All files are tried; errors go to the findings.
+///
+/// # Errors
+/// Cancelled.
+pub(crate) fn textures(
+    loaded: &Loaded,
+    needed: &Needed,
+    cache: &mut TextureCache,
+    findings: &mut Findings,
+    reading: &Reading<'_>,
+) -> Result<Staged<Textures>, Stop> {
+    let mut textures = Textures::default();
+    let Needed { textures: needed, left_out, are_required } = needed;
+    if needed.is_empty() {
+        let why = match left_out {
+            0 => "nothing that is seen names a texture",
+            _ => "the view shows no texture",
+        };
+        return Ok(Staged::skipped(textures, why));
+    }
+    let environment = environment_source(&loaded.scene);
+    let images = images(needed, cache, reading)?;
+    let assets = load_all(&images, MOST_BYTES, reading);
+    let mut counts = Counts::default();
+    for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
+        (image.content, image.linked) = contents;
+        let key = image.key();
+        for one in &image.asked_by {
+            findings.read(FileRead { path: one.source.path.clone(), content: image.content });
+        }
+        if let Some(file) = &image.linked {
+            findings.read(file.clone());
+            cache.linked.insert(image.name.clone(), file.path.clone());
+        }
+        match asset {
+            Ok((decoded, mipmaps, was_kept)) => {
+                let texels = &decoded.texels;
+                let loaded_image = Image { texels: texels.clone(), mipmaps: mipmaps.clone() };
+                counts.kept += usize::from(was_kept);
+                counts.loaded += usize::from(!was_kept);
+                textures.texels_loaded += if image.kept.texels.is_some() { 0 } else { texels.len() as u64 };
+                let of_levels = mipmaps.as_ref().map_or(0, |mipmaps| mipmaps.memory_bytes());
+                textures.memory_bytes += (texels.memory_bytes() + of_levels) as u64;
+                textures.keys.push(key);
+                if image.asked_by.iter().any(|one| one.mesh_file.is_some()) {
+                    textures.of_files.push(key);
+                }
+                for one in &image.asked_by {
+                    textures.images.insert(one.source.clone(), loaded_image.clone());
+                    textures.key_of.insert(one.source.clone(), key);
+                    if Some(&one.source) == environment.as_ref() {
+                        textures.environment = Some((key, texels.clone()));
+                    }
+                }
+                warn_of_unusable(loaded, &image, texels, findings);
+                warn_of_heights(loaded, &image, texels, findings);
+                warn_of_full_alpha(loaded, &image, texels, findings);
+                for warning in &decoded.warnings {
+                    findings.warn(loaded, place(loaded, image.asked_by[0]), warning.clone());
+                }
+                if let Some(mipmaps) = &mipmaps {
+                    let bytes = mipmaps.memory_bytes();
+                    cache.mipmaps.insert(image.name.clone(), key, (mipmaps.clone(), bytes));
+                }
+                let bytes = texels.memory_bytes();
+                cache.texels.insert(image.name, key, (decoded, bytes));
+            }
+            Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
+            Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(error) if !are_required && is_model(&loaded.path) => {
+                counts.failed += 1;
+                for one in &image.asked_by {
+                    show_without(loaded, one, &error, &mut textures.images, findings);
+                }
+            }
+            Err(error) => {
+                counts.failed += 1;
+                for one in &image.asked_by {
+                    match (&one.material, one.mesh_file) {
+                        (Some(material), Some(file)) => {
+                            let file = loaded.scene.mesh_files[file].value.display();
+                            let help = format!("the material \"{material}\" of {file} names it");
+                            findings.error(loaded, place(loaded, one), error.to_string(), &help);
+                        }
+                        _ => findings.asset_error(loaded, place(loaded, one), &error),
+                    }
+                }
+            }
+        }
+    }
+    if let Some((_, texels)) = textures.environment.as_ref().filter(|(_, texels)| texels.is_black()) {
+        let size = format!("{} × {}", texels.width, texels.height);
+        let message = format!("the map of the environment is black: none of its {size} pixels gives light");
+        findings.warn(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
+    }
+    Ok(loaded_and_kept(textures, Counts { left_out: *left_out, ..counts }))
+}
+
+/// Warns of an image that a model is shown without, and puts even texels in its place: factors are then what is seen, but for
+/// emission, which is left out. Materials of mesh files have values of their own in place of textures that are not there.
+fn show_without(
+    loaded: &Loaded,
+    one: &NeededTexture,
+    error: &AssetError,
+    images: &mut Images,
+    findings: &mut Findings,
+) {
+    let file = loaded.path.display();
+    let mut warn = |material: &str| {
+        let help = format!("the material \"{material}\" of {file} is shown without it");
+        let warning =
+            loaded.diagnostic_at(place(loaded, one), Severity::Warning, error.to_string(), Some(help));
+        if !findings.warnings.contains(&warning) {
+            findings.warnings.push(warning);
+        }
+    };
+    one.material.iter().for_each(|material| warn(material));
+    let Some(declared) = one.declared else { return };
+    let mut is_light = true;
+    for material in &loaded.scene.materials {
+        let mut roles =
+            material.textures().into_iter().filter(|(texture, _)| *texture == declared).peekable();
+        if roles.peek().is_some() {
+            warn(&material.name);
+        }
+        is_light &= roles.all(|(_, role)| role == TextureRole::Emission);
+    }
+    let texel = match one.source.encoding {
+        ImageEncoding::Linear => Vec3::new(0.5, 0.5, 1.0),
+        ImageEncoding::Color | ImageEncoding::CutOut(ColorCurve::Auto) if is_light => Vec3::ZERO,
+        ImageEncoding::Color
+        | ImageEncoding::Srgb
+        | ImageEncoding::Raw
+        | ImageEncoding::CutOut(_)
+        | ImageEncoding::Number { .. } => Vec3::ONE,
+    };
+    let texels = Texels { width: 1, height: 1, data: TexelData::Float(vec![texel]), unusable: 0 };
+    images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
+}
+
+/// Says how much of an image cannot be shown.
+fn warn_of_unusable(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
+    let count = match texels.unusable {
+        0 => return,
+        1 => "1 pixel is".to_owned(),
+        count => format!("{count} pixels are"),
+    };
+    let path = image.path().display();
+    let message =
+        format!("{path}: {count} negative, not finite or beyond 1e18 in red, green or blue; 0 stands there");
+    findings.warn(loaded, place(loaded, image.asked_by[0]), message);
+}
+
+/// Says that a grey image has heights in place of normals. That of a mesh file bends nothing.
+fn warn_of_heights(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
+    let normals = image.asked_by.iter().find_map(|one| Some((one, one.normals_of.as_deref()?)));
+    let Some((one, material)) = normals.filter(|_| texels.is_gray()) else { return };
+    let effect = match one.mesh_file {
+        Some(_) => "it bends nothing (`bump` takes heights)",
+        None => "it tilts everything to one side; `bump` takes heights",
+    };
+    let path = image.path().display();
+    let message = format!("{path} is grey: heights in place of the normals of \"{material}\"; {effect}");
+    findings.warn(loaded, place(loaded, one), message);
+}
+
+/// Says that alpha by `channel = "a"` is 1 in all pixels.
+fn warn_of_full_alpha(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
+    const ALPHA: PixelValue = PixelValue::Channel(Channel::Alpha);
+    let is_alpha = |one: &&&NeededTexture| {
+        matches!(one.source.encoding, ImageEncoding::Number { of: ALPHA, is_srgb: _ })
+    };
+    let Some(one) = image.asked_by.iter().find(is_alpha).filter(|_| texels.is_white()) else { return };
+    let path = image.path().display();
+    let message = format!("{path} has no alpha below 1: `channel = \"a\"` is 1 everywhere");
+    findings.warn(loaded, place(loaded, one), message);
+}
+
+/// Place in the scene of the name of the environment map.
+fn environment_span(scene: &Scene) -> Option<Range<usize>> {
+    scene.environment.as_ref()?.file.as_ref().map(|file| file.span.clone())
+}
+
+impl Wanted<'_> {
+    /// Whether its levels are looked up.
+    fn has_mipmaps(&self) -> bool {
+        self.asked_by.iter().any(|one| one.has_mipmaps)
+    }
+
+    fn path(&self) -> &Path {
+        &self.asked_by[0].source.path
+    }
+
+    fn key(&self) -> Key {
+        let (path, image, encoding, coverage) = &self.name;
+        let mut key = Fingerprint::new("texture");
+        key.path(path).index(encoding.index()).index(image.map_or(0, |image| image as usize + 1));
+        if let Some(cutoff) = coverage {
+            key.f32(cutoff.value());
+        }
+        self.content.add_to(&mut key);
+        if let Some(FileRead { path, content }) = &self.linked {
+            content.add_to(key.path(path));
+        }
+        key.finish()
+    }
+}
+
+/// Each file once for each reading of its numbers, in the order asked for, with what the cache has of it.
+fn images<'a>(
+    needed: &'a [NeededTexture],
+    cache: &mut TextureCache,
+    reading: &Reading<'_>,
+) -> Result<Vec<Wanted<'a>>, Cancelled> {
+    let mut images: Vec<Wanted<'a>> = Vec::new();
+    let mut known = HashMap::new();
+    for one in needed {
+        let name = name(&one.source);
+        let index = *known.entry(name.clone()).or_insert(images.len());
+        if let Some(image) = images.get_mut(index) {
+            image.asked_by.push(one);
+            continue;
+        }
+        let content = reading.contents.read(&one.source.path, reading.token)?;
+        let linked = cache.linked.get(&name).map(|path| {
+            let content = reading.contents.read(path, reading.token)?;
+            Ok(FileRead { path: path.clone(), content })
+        });
+        let (linked, kept) = (linked.transpose()?, Kept::default());
+        images.push(Wanted { name, content, linked, kept, asked_by: vec![one] });
+    }
+    for image in &mut images {
+        let key = image.key();
+        image.kept.texels = cache.texels.get(&image.name, key);
+        if image.has_mipmaps() {
+            image.kept.mipmaps = cache.mipmaps.get(&image.name, key);
+        }
+    }
+    Ok(images)
+}
+
+/// The texels of each, and whether they were kept from before. What would take more than `most_bytes` together with those
+/// before it is not loaded.
+fn load_all(
+    images: &[Wanted<'_>],
+    most_bytes: u64,
+    reading: &Reading<'_>,
+) -> Vec<(Contents, Result<Found, AssetError>)> {
+    let size = |image: &Wanted<'_>| {
+        let (width, height, bytes) = match image.kept.texels.as_deref() {
+            Some(Decoded { texels, .. }) => (texels.width, texels.height, texels.memory_bytes() as u64),
+            // One that cannot be read says so when it is loaded.
+            None => size_of(&image.asked_by[0].source, reading).unwrap_or_default(),
+        };
+        let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
+        bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height, is_weighted) } else { 0 }
+    };
+    let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
+    let over = over_budget(&sizes, most_bytes);
+    let load = |(image, over): (&Wanted<'_>, Option<String>)| {
+        let mut contents = (image.content, image.linked.clone());
+        let result = match over {
+            Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
+            None => load_one(image, &mut contents, reading),
+        };
+        (contents, result)
+    };
+    reading.pool.install(|| images.par_iter().zip(over).map(load).collect())
+}
+
+/// For each image of these sizes whether it goes over what all may take, in words.
+fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
+    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+    let mut before = 0;
+    let check = |&size: &u64| {
+        if before + size <= most_bytes {
+            before += size;
+            return None;
+        }
+        Some(format!(
+            "it takes {} MiB of memory, and the images before it {} MiB: more than the {} MiB that a scene's images may \
+             take together; make some of them smaller or leave some out",
+            mib(size),
+            mib(before),
+            mib(most_bytes)
+        ))
+    };
+    sizes.iter().map(check).collect()
+}
+
+/// Content of the file of an image, and the file of its own that an image of a glTF file has.
+type Contents = (Content, Option<FileRead>);
+
+/// An image, its levels, and whether all of that was kept from before.
+type Found = (Arc<Decoded>, Option<Arc<Mipmaps>>, bool);
+
+/// An image with its levels. `contents` become those that were decoded.
+fn load_one(image: &Wanted<'_>, contents: &mut Contents, reading: &Reading<'_>) -> Result<Found, AssetError> {
+    let mut was_kept = true;
+    let decoded = match &image.kept.texels {
+        Some(decoded) => decoded.clone(),
+        None => {
+            was_kept = false;
+            let LoadedImage { texels, warnings } = decode(image, contents, reading)?;
+            Arc::new(Decoded { texels: Arc::new(texels), warnings })
+        }
+    };
+    let mipmaps = match &image.kept.mipmaps {
+        None if image.has_mipmaps() => {
+            was_kept = false;
+            let made = match image.asked_by[0].source.coverage {
+                None => mipmaps(&decoded.texels, reading.token)?,
+                Some(cutoff) => coverage(&decoded.texels, cutoff.value(), reading.token)?,
+            };
+            Some(Arc::new(made))
+        }
+        kept => kept.clone(),
+    };
+    Ok((decoded, mipmaps, was_kept))
+}
+
+/// The texels of an image. `contents` become those that were decoded.
+fn decode(
+    image: &Wanted<'_>,
+    contents: &mut Contents,
+    reading: &Reading<'_>,
+) -> Result<LoadedImage, AssetError> {
+    let (one, limits) = (image.asked_by[0], ImageLimits::default());
+    let (encoding, token) = (one.source.encoding, reading.token);
+    contents.1 = None;
+    let file = match one.source.image {
+        None => image.path().to_owned(),
+        Some(number) => {
+            let (input, hash) = reading.containers.image((image.path(), number), token)?;
+            contents.0 = reading.contents.decoded(image.path(), hash);
+            match input {
+                ImageInput::Bytes(bytes) => {
+                    let within = ImageWithin { path: image.path(), bytes };
+                    let load =
+                        |progress: Progress<'_>| load_within(within, encoding, limits, progress, token);
+                    return reading.sink.asset(&one.name, load);
+                }
+                ImageInput::File(path) => {
+                    let content = reading.contents.read(&path, token)?;
+                    contents.1 = Some(FileRead { path: path.clone(), content });
+                    path
+                }
+            }
+        }
+    };
+    let load = |progress: Progress<'_>| load_hashed(&file, encoding, limits, progress, token);
+    let (texels, hash) = reading.sink.asset(&one.name, load)?;
+    let content = reading.contents.decoded(&file, hash);
+    match &mut contents.1 {
+        Some(linked) => linked.content = content,
+        None => contents.0 = content,
+    }
+    Ok(texels)
+}
+
+/// Where an image is read from.
+fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, AssetError> {
+    match source.image {
+        None => Ok(ImageInput::File(source.path.clone())),
+        Some(image) => reading.containers.image((&source.path, image), reading.token).map(|(input, _)| input),
+    }
+}
+
+/// Columns, rows and bytes of an image.
+fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u64), AssetError> {
+    let (limits, encoding) = (ImageLimits::default(), source.encoding);
+    match input(source, reading)? {
+        ImageInput::File(path) => size(&path, encoding, limits, reading.token),
+        ImageInput::Bytes(bytes) => {
+            size_within(ImageWithin { path: &source.path, bytes }, encoding, limits, reading.token)
+        }
+    }
+}
+
+/// For `check`: also the textures of the scene file that no visible material names, and the map of a black environment.
+pub(crate) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
+    let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
+    let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
+    for (index, texture) in loaded.scene.textures.iter().enumerate() {
+        if !known.insert(name(&texture.file.value, texture.image)) {
+            continue;
+        }
+        let encoding = match texture.encoding {
+            Encoding::Auto => ImageEncoding::Color,
+            Encoding::Srgb => ImageEncoding::Srgb,
+            Encoding::Linear => ImageEncoding::Linear,
+        };
+        let (path, image) = (texture.file.value.clone(), texture.image);
+        let source = TextureSource { path, image, encoding, coverage: None };
+        wanted.push(NeededTexture {
+            source,
+            name: texture.name.clone(),
+            declared: Some(index),
+            mesh_file: None,
+            material: None,
+            normals_of: None,
+            is_environment: false,
+            has_mipmaps: false,
+        });
+    }
+    let environment = loaded.scene.environment.as_ref().and_then(|environment| environment.file.as_ref());
+    if let Some(file) = environment.filter(|file| known.insert(name(&file.value, None))) {
+        wanted.push(NeededTexture::of_environment(&file.value));
+    }
+}
+
+/// Place in the scene of a texture: its own table, or the mesh whose materials look it up.
+fn place(loaded: &Loaded, one: &NeededTexture) -> Range<usize> {
+    let scene = &loaded.scene;
+    let declared = one.declared.map(|index| scene.textures[index].file.span.clone());
+    let mesh = || one.mesh_file.map(|index| scene.mesh_files[index].span.clone());
+    let environment = || environment_span(scene).filter(|_| one.is_environment);
+    declared.or_else(mesh).or_else(environment).unwrap_or(0..0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+    use crate::protocol::{Failure, Stage, Status};
+    use crate::tests::{Bench, SCENE};
+
+    #[test]
+    fn the_images_of_a_scene_share_their_memory() {
+        let over = over_budget(&[600, 400, 0, 25, 1], 1001);
+        assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
+        // Three pictures of 15999 × 15999, packed: 732.3 MiB each by their headers, behind which few pixels follow.
+        let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.tga\"\n");
+        let ball = |name: &str| {
+            format!(
+                "[materials.{name}]\ndiffuse = {{ texture = \"{name}\" }}\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
+                 material = \"{name}\"\n"
+            )
+        };
+        let names = ["one", "two", "three"];
+        let tables: String = names.iter().map(|name| table(name) + &ball(name)).collect();
+        let mut bench = Bench::new(&format!("{SCENE}{tables}"));
+        let header = "\0\0\x0a\0\0\0\0\0\0\0\0\0\x7f\x3e\x7f\x3e\x18\0";
+        for name in names {
+            // As long as a file of so many pixels is at the least, 128 in a run.
+            bench.write(&format!("{name}.tga"), &format!("{header}{}", "\0".repeat(3 << 20)));
+        }
+        let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
+        let over: Vec<_> = errors.iter().filter(|error| error.message.contains("together")).collect();
+        assert_eq!(over.len(), 1, "{errors:?}");
+        assert!(over[0].message.contains("three.tga: it takes 733 MiB"), "{}", over[0].message);
+        assert!(over[0].message.contains("the images before it 1465 MiB"), "{}", over[0].message);
+        assert!(over[0].message.contains("make some of them smaller"), "{}", over[0].message);
+    }
+
+    #[test]
+    fn one_file_by_two_names_is_loaded_once_and_kept() {
+        let tables = "[textures.other]\nfile = \"./skin.ppm\"\n[materials.other]\ndiffuse = { texture = \"other\" }\n\
+                      [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"other\"\n";
+        let mut bench = Bench::new(&format!("{SCENE}{tables}"));
+        let report = bench.done().0;
+        assert_eq!(report.counters.texels_loaded, 1);
+        bench.edit("[0.5, 0.5, 0.5]", "[0.6, 0.5, 0.5]");
+        let report = bench.done().0;
+        assert_eq!(report.stages[Stage::Textures as usize].status, Status::Reused);
+        // Both names are watched.
+        fs::write(bench.path("skin.ppm"), "P6\n1 1\n255\nxyz").expect("written");
+        assert_eq!(bench.done().0.stages[Stage::Textures as usize].status, Status::Done);
+    }
+}

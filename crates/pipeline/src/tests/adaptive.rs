@@ -1,0 +1,103 @@
+//! Tiles that stop by their noise.
+
+use super::Bench;
+use crate::protocol::{Section, Stage};
+
+/// A lamp over a floor with a ball: penumbras in some tiles, next to nothing in others.
+const LIT: &str = r#"
+[render]
+width = 128
+height = 96
+samples = 256
+error = 0.02
+[camera]
+position = [0, 3, 6]
+look_at = [0, 0.5, 0]
+[materials.wall]
+diffuse = [0.5, 0.5, 0.5]
+[materials.lamp]
+emission = [9, 9, 9]
+[[quad]]
+corner = [-8, 0, 8]
+u = [16, 0, 0]
+v = [0, 0, -16]
+material = "wall"
+[[sphere]]
+center = [0, 0.7, 0]
+radius = 0.7
+material = "wall"
+[[quad]]
+corner = [-1, 4, -1]
+u = [2, 0, 0]
+v = [0, 0, 2]
+material = "lamp"
+"#;
+
+#[test]
+fn smooth_tiles_stop_and_noisy_ones_go_on() {
+    let mut bench = Bench::new(LIT);
+    let report = bench.done().0;
+    assert_eq!(report.image.samples.min, 16);
+    assert!(report.image.samples.max > 32, "{:?}", report.image.samples);
+    assert!(report.image.complete);
+    let why = &report.stages[Stage::Render as usize].why;
+    assert!(why.contains("below 0.02"), "{why}");
+    bench.overrides.error = Some(0.0);
+    let report = bench.done().0;
+    assert_eq!((report.image.samples.min, report.image.samples.max), (256, 256));
+}
+
+#[test]
+fn it_has_the_same_bits_whatever_the_threads_and_the_way_there() {
+    let mut pictures = Vec::new();
+    for threads in [1, 2, 7] {
+        let mut bench = Bench::new(LIT);
+        bench.overrides.threads = Some(threads);
+        bench.done();
+        pictures.push(bench.picture());
+    }
+    // More samples asked for on the way, at a power of two and beside one.
+    let mut bench = Bench::new(LIT);
+    for samples in [16, 40, 256] {
+        bench.overrides.samples = Some(samples);
+        bench.done();
+    }
+    pictures.push(bench.picture());
+    // A part of it before the rest.
+    let mut bench = Bench::new(LIT);
+    bench.first = Some(Section { left: 0.3, top: 0.2, width: 0.3, height: 0.4 });
+    bench.done();
+    pictures.push(bench.picture());
+    assert!(pictures.iter().all(|picture| *picture == pictures[0]));
+}
+
+#[test]
+fn a_budget_of_time_puts_samples_where_they_lower_the_error_most() {
+    let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
+    bench.overrides.samples = Some(1 << 20);
+    let samples = [0.2, 0.8, 3.2, 12.8, 51.2].into_iter().find_map(|seconds| {
+        bench.overrides.time_seconds = Some(seconds);
+        let samples = bench.done().0.image.samples;
+        (samples.mean > 100.0).then_some(samples)
+    });
+    let samples = samples.expect("a machine that renders");
+    assert!(samples.min >= 4 && samples.max >= 8 * samples.min, "{samples:?}");
+}
+
+#[test]
+fn a_budget_of_time_that_suffices_changes_nothing() {
+    let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
+    bench.overrides.samples = Some(100);
+    bench.done();
+    let expected = bench.picture();
+    for threads in [1, 2, 7] {
+        let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
+        bench.overrides.samples = Some(100);
+        bench.overrides.threads = Some(threads);
+        bench.overrides.time_seconds = Some(1e4);
+        let report = bench.done().0;
+        assert!(report.image.complete);
+        assert_eq!((report.image.samples.min, report.image.samples.max), (100, 100));
+        assert_eq!(bench.picture(), expected);
+    }
+}

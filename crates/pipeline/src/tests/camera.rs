@@ -1,0 +1,327 @@
+//! A camera that is moved by the front end.
+
+use super::*;
+use crate::math::DVec3;
+use crate::protocol::{CameraEdit, Kept, MovedCamera, Picked, Spot};
+use crate::scene::description::{CameraChange, Pose, Viewpoint};
+
+/// A mirror, and photons that it throws.
+const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
+    [materials.steel]\ntype = \"mirror\"\n[photons]\nenabled = true\ncount = 500\n";
+
+fn moved() -> CameraChange {
+    let pose = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
+    CameraChange { pose: Some(pose), fov: Some(35.0), focus: None }
+}
+
+/// The camera of a request: the scene's own, as the request says it, with what the front end changes.
+fn camera(bench: &mut Bench) -> Viewpoint {
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let camera = |event: &Event| match event {
+        Event::Settings { camera, .. } => Some(*camera),
+        _ => None,
+    };
+    let own = events.iter().find_map(camera).expect("a camera");
+    own.changed(&bench.overrides.camera)
+}
+
+#[test]
+fn a_moved_camera_keeps_trees_lights_and_photons() {
+    let mut bench = Bench::new(&format!("{SCENE}{PHOTONS}"));
+    bench.done();
+    let own = bench.picture();
+    bench.overrides.camera = moved();
+    bench.writing = Writing::No;
+    let (report, _) = bench.done();
+    assert_statuses(&report, "rrrrrrds");
+    assert_eq!(report.counters.photons_emitted, 0);
+    assert_eq!(bench.picture(), own, "it is shown alone");
+    bench.overrides.camera = CameraChange::default();
+    bench.writing = Writing::Must;
+    assert_statuses(&bench.done().0, "rrrrrrrr");
+}
+
+#[test]
+fn a_moved_camera_gives_the_picture_that_the_file_would() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.camera = moved();
+    bench.done();
+    let shown = bench.picture();
+    bench.overrides.camera = CameraChange::default();
+    bench.done();
+    assert_ne!(bench.picture(), shown);
+    bench.overrides.sets = vec!["camera.position=[0.5,1.5,4.25]".to_owned(), "camera.fov=35".to_owned()];
+    assert_statuses(&bench.done().0, "drrrrsrd");
+    assert_eq!(bench.picture(), shown);
+}
+
+#[test]
+fn the_plane_in_focus_goes_with_what_is_looked_at_unless_the_scene_says_where_it_is() {
+    for (scene, expected) in [
+        (SCENE.to_owned(), moved().pose.expect("a pose").distance()),
+        (SCENE.replace("[camera]", "[camera]\nfocus = 2.5"), 2.5),
+    ] {
+        let mut bench = Bench::new(&scene);
+        bench.overrides.camera = moved();
+        assert_eq!(camera(&mut bench).focus, expected);
+        bench.overrides.camera.focus = Some(1.25);
+        assert_eq!(camera(&mut bench).focus, 1.25);
+    }
+}
+
+#[test]
+fn an_orbiter_camera_is_moved_by_vectors() {
+    let orbiter = SCENE.replace("position = [0, 1, 4]\nlook_at = [0, 1, 0]", "orbiter = \"camera.txt\"");
+    let mut bench = Bench::new(&orbiter);
+    bench.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 5\nf 40 4 3\n");
+    let own = camera(&mut bench);
+    assert_eq!((own.pose.position, own.pose.look_at, own.fov), (DVec3::new(0.0, 1.0, 4.0), DVec3::Y, 40.0));
+    bench.overrides.camera = moved();
+    bench.done();
+    let shown = bench.picture();
+    let mut other = Bench::new(SCENE);
+    other.overrides.camera = moved();
+    other.done();
+    assert_eq!(other.picture(), shown);
+}
+
+/// The answer to an errand.
+fn answer(bench: &mut Bench, command: Command) -> Event {
+    bench.worker.send(command);
+    loop {
+        let event = bench.next();
+        if matches!(event, Event::Picked { .. } | Event::CameraKept { .. } | Event::CameraUndone { .. }) {
+            return event;
+        }
+    }
+}
+
+fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<Kept, String> {
+    keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
+}
+
+/// The same, of a camera that was moved from this one of the scene.
+fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<Kept, String> {
+    match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
+        Event::CameraKept { outcome, .. } => outcome,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn undo(bench: &mut Bench, edit: CameraEdit) -> Result<std::path::PathBuf, String> {
+    match answer(bench, Command::UndoCamera(edit)) {
+        Event::CameraUndone { outcome, .. } => outcome,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn pick(bench: &mut Bench, x: f64, y: f64) -> Picked {
+    match answer(bench, Command::Pick(Spot { x, y })) {
+        Event::Picked { picked, .. } => *picked,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_camera_that_is_kept_renders_nothing_anew() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let shown = bench.picture();
+    let kept = keep(&mut bench, camera).expect("written");
+    assert_eq!((kept.path, kept.is_new, kept.is_own), (bench.path("scene.toml"), true, true));
+    let expected = SCENE
+        .replace("[0, 1, 4]", "[0.5, 1.5, 4.25]")
+        .replace("look_at = [0, 1, 0]", "look_at = [0, 1, 0]\nfov = 35");
+    assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), expected);
+    bench.overrides.camera = CameraChange::default();
+    let (report, unchanged) = bench.done();
+    assert_statuses(&report, "drrrrsrr");
+    assert!(unchanged && bench.picture() == shown);
+    assert!(!keep(&mut bench, camera).expect("nothing to do").is_new);
+}
+
+#[test]
+fn a_file_that_changed_is_not_written_over() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    bench.edit("[camera]", "# somebody else\n[camera]");
+    let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    let why = keep(&mut bench, camera).expect_err("refused");
+    assert!(why.contains("changed since it was read"), "{why}");
+    assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
+    bench.done();
+    assert!(keep(&mut bench, camera).expect("read again").is_new);
+}
+
+#[test]
+fn a_camera_of_before_a_save_is_not_written_over_the_camera_of_that_save() {
+    let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
+    bench.done();
+    let own = bench.own.get().expect("a camera");
+    let moved = own.changed(&CameraChange { fov: None, ..moved() });
+    // The worker has read the save when it hears of the camera that was moved before.
+    bench.edit("fov = 34", "fov = 20");
+    bench.done();
+    let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    let why = keep_moved_from(&mut bench, moved, own).expect_err("refused");
+    assert!(why.contains("camera has changed") && why.contains("press c again"), "{why}");
+    assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
+    // Moved from the camera that the file has now, it is written, and the save stays.
+    let moved = Viewpoint { fov: 20.0, ..moved };
+    assert!(keep(&mut bench, moved).expect("written").is_new);
+    let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    assert!(text.contains("fov = 20") && text.contains("[0.5, 1.5, 4.25]"), "{text}");
+}
+
+#[test]
+fn a_kept_camera_is_taken_back_to_the_byte() {
+    let mut bench = Bench::new(SCENE);
+    let text = |bench: &Bench| fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
+    let kept = text(&bench);
+    // What somebody wrote since is left alone, before and after glimt has read it.
+    bench.edit("[camera]", "# somebody else\n[camera]");
+    let edited = text(&bench);
+    for _ in 0..2 {
+        let why = undo(&mut bench, edit.clone()).expect_err("refused");
+        assert!(why.contains("has changed since c wrote it"), "{why}");
+        assert_eq!(text(&bench), edited);
+        bench.done();
+    }
+    // Once the file is again as it was left, it goes back.
+    fs::write(bench.path("scene.toml"), &kept).expect("written");
+    assert_eq!(undo(&mut bench, edit.clone()), Ok(bench.path("scene.toml")));
+    assert_eq!(text(&bench), SCENE);
+    assert!(undo(&mut bench, edit).is_err(), "there is nothing of it left");
+    assert_eq!(text(&bench), SCENE);
+}
+
+#[test]
+fn a_scene_file_that_is_gone_is_said_to_be_gone() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
+    fs::remove_file(bench.path("scene.toml")).expect("removed");
+    let why = undo(&mut bench, edit).expect_err("refused");
+    assert!(why.ends_with("scene.toml is gone: there is nothing to undo in it"), "{why}");
+    let why = keep(&mut bench, camera).expect_err("refused");
+    assert_eq!(why, "the scene file is gone: the camera is not written");
+    assert!(!bench.path("scene.toml").exists());
+}
+
+#[test]
+fn a_kept_camera_follows_links_and_keeps_permissions() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let mut bench = Bench::new(SCENE);
+    let real = bench.path("real.toml");
+    fs::rename(bench.path("scene.toml"), &real).expect("renamed");
+    symlink("real.toml", bench.path("scene.toml")).expect("a link");
+    fs::set_permissions(&real, fs::Permissions::from_mode(0o640)).expect("permitted");
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    assert!(keep(&mut bench, camera).expect("written").is_own);
+    assert!(bench.path("scene.toml").is_symlink());
+    assert_eq!(fs::metadata(&real).expect("a file").permissions().mode() & 0o777, 0o640);
+    assert!(fs::read_to_string(&real).expect("a scene").contains("fov = 35"));
+}
+
+#[test]
+fn a_kept_camera_keeps_the_attributes_of_the_file() {
+    let mut bench = Bench::new(SCENE);
+    let path = bench.path("scene.toml");
+    // A file system without them has nothing to lose.
+    if xattr::set(&path, "user.note", b"mine").is_err() {
+        return;
+    }
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    assert!(keep(&mut bench, camera).expect("written").is_new);
+    assert_eq!(xattr::get(&path, "user.note").expect("attributes").as_deref(), Some(b"mine".as_slice()));
+}
+
+#[test]
+fn a_file_that_would_lose_something_keeps_its_camera() {
+    for (why, is_linked) in [("has other hard links", true), ("is read-only", false)] {
+        let mut bench = Bench::new(SCENE);
+        let path = bench.path("scene.toml");
+        if is_linked {
+            fs::hard_link(path, bench.path("other.toml")).expect("another name");
+        } else {
+            let mut permissions = fs::metadata(&path).expect("a file").permissions();
+            permissions.set_readonly(true);
+            fs::set_permissions(path, permissions).expect("permitted");
+        }
+        bench.overrides.camera = moved();
+        let camera = camera(&mut bench);
+        let refusal = keep(&mut bench, camera).expect_err(why);
+        assert!(refusal.contains(why), "{refusal}");
+        assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), SCENE);
+    }
+}
+
+#[test]
+fn what_the_call_sets_stays_before_the_file() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.sets = vec!["camera.fov=20".to_owned()];
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let kept = keep(&mut bench, camera).expect("written");
+    assert!(kept.is_new && !kept.is_own);
+    assert!(fs::read_to_string(bench.path("scene.toml")).expect("a scene").contains("fov = 35"));
+}
+
+#[test]
+fn what_is_at_a_place_is_said() {
+    let mut bench = Bench::new(&SCENE.replace("center = [0, 1, 0]", "name = \"globe\"\ncenter = [0, 1, 0]"));
+    bench.done();
+    let middle = pick(&mut bench, 0.5, 0.5);
+    let thing = middle.thing.expect("the ball");
+    assert_eq!(
+        (thing.shape, thing.name.as_deref(), thing.material.as_str()),
+        ("sphere", Some("globe"), "phong ball")
+    );
+    let line = SCENE.lines().position(|line| line == "[[sphere]]").expect("a sphere") + 1;
+    assert_eq!((thing.path, thing.line), (bench.path("scene.toml"), line));
+    assert!(
+        (thing.position[2] - 0.5).abs() < 0.01 && (thing.distance - 3.5).abs() < 0.01,
+        "{:?}",
+        thing.position
+    );
+    assert!(thing.normal[2] > 0.99 && thing.is_front && (thing.depth - 3.5).abs() < 0.01);
+    assert_eq!(middle.pixel, [20, 15]);
+    assert!(middle.color.expect("a sample").iter().all(|channel| channel.is_finite()));
+    assert_eq!(pick(&mut bench, 0.0, 0.0).thing, None);
+    assert_eq!(pick(&mut bench, 7.0, -1.0).pixel, [39, 0], "the nearest pixel");
+}
+
+#[test]
+fn a_render_under_way_answers_and_goes_on() {
+    let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 1000000"));
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
+    assert!(pick(&mut bench, 0.5, 0.5).thing.is_some());
+    let camera = Viewpoint { pose: moved().pose.expect("a pose"), fov: 40.0, aperture: 0.0, focus: 1.0 };
+    assert!(keep(&mut bench, camera).expect("written").is_new);
+    assert!(matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }), "it goes on");
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+}
+
+#[test]
+fn a_material_of_a_mesh_file_is_named() {
+    let mut bench =
+        Bench::new("[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[[mesh]]\nfile = \"two.obj\"\n");
+    bench.write("two.mtl", "newmtl chalk\nKd 1 1 1\n");
+    let half = |x: i32, own: &str| format!("v {x} -1 0\nv 0 -1 0\nv 0 1 0\n{own}\nf -3 -2 -1\n");
+    bench.write("two.obj", &format!("mtllib two.mtl\n{}{}", half(1, ""), half(-1, "usemtl chalk")));
+    bench.done();
+    let mut material = |x| pick(&mut bench, x, 0.6).thing.expect("a half").material;
+    assert_eq!(material(0.45), "chalk, of the file");
+    assert_eq!(material(0.55), "none of the file");
+}

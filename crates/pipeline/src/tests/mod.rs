@@ -1,0 +1,223 @@
+//! The worker driven by messages, as front ends do it.
+
+mod adaptive;
+mod camera;
+mod orders;
+mod own;
+mod photons;
+mod previews;
+mod reuse;
+mod switching;
+mod targets;
+
+use std::cell::Cell;
+use std::fs;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use crate::engine::Means;
+use crate::protocol::{
+    Command, Event, Failure, LatestPreview, PreviewSize, Report, Request, Section, Spot, Stage, Status,
+    Writing,
+};
+use crate::scene::Loaded;
+use crate::scene::description::Viewpoint;
+use crate::scene::diagnostic::Diagnostic;
+use crate::settings::Overrides;
+use crate::trace::Kernel;
+use crate::worker::{Handle, start_with};
+
+/// The scene of this text, with a camera added if it has none.
+pub(crate) fn loaded_of(text: &str) -> Loaded {
+    let place = "position = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+    let text = if text.contains("[camera]\n") {
+        text.replace("[camera]\n", &format!("[camera]\n{place}"))
+    } else {
+        format!("{text}\n[camera]\n{place}")
+    };
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let path = folder.path().join("scene.toml");
+    fs::write(&path, text).expect("written");
+    crate::scene::load(&path, &[]).expect("a scene that is right")
+}
+
+pub(super) const SCENE: &str = r#"
+[render]
+width = 40
+height = 30
+samples = 4
+exposure = 0.0
+[camera]
+position = [0, 1, 4]
+look_at = [0, 1, 0]
+[textures.skin]
+file = "skin.ppm"
+[materials.ball]
+type = "phong"
+diffuse = { texture = "skin" }
+[materials.wall]
+type = "phong"
+diffuse = [0.5, 0.5, 0.5]
+[[sphere]]
+center = [0, 1, 0]
+radius = 0.5
+material = "ball"
+[[mesh]]
+file = "one.obj"
+material = "wall"
+translate = [0, 0, 0]
+[[light]]
+type = "point"
+position = [0, 3, 0]
+intensity = [10, 10, 10]
+"#;
+
+pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+pub(super) const KERNEL: Kernel = crate::integrators::render_tile_with_photons;
+
+pub(crate) struct Bench {
+    pub(super) folder: tempfile::TempDir,
+    /// Name of the scene, or of the model.
+    pub(super) scene: &'static str,
+    pub(super) worker: Handle,
+    pub(super) generation: u64,
+    pub(super) overrides: Overrides,
+    pub(super) preview: Option<PreviewSize>,
+    pub(super) force: bool,
+    pub(super) first: Option<Section>,
+    pub(super) writing: Writing,
+    /// The scene's own camera, as the worker said it last.
+    pub(super) own: Cell<Option<Viewpoint>>,
+}
+
+impl Bench {
+    pub(super) fn new(scene: &str) -> Self {
+        Self::with(scene, KERNEL)
+    }
+
+    pub(super) fn with(scene: &str, kernel: Kernel) -> Self {
+        Self::with_means(scene, Means { kernel, ..Means::default() })
+    }
+
+    pub(super) fn with_means(scene: &str, means: Means) -> Self {
+        let folder = tempfile::tempdir().expect("a scratch folder");
+        let output = folder.path().join("out.ppm");
+        let overrides = Overrides { outputs: vec![output], threads: Some(2), ..Default::default() };
+        let worker = start_with(means).expect("a thread");
+        let bench = Self {
+            folder,
+            scene: "scene.toml",
+            worker,
+            generation: 0,
+            overrides,
+            preview: None,
+            force: false,
+            first: None,
+            writing: Writing::Must,
+            own: Cell::new(None),
+        };
+        bench.write("scene.toml", scene);
+        bench.write("one.obj", OBJ);
+        bench.write("skin.ppm", "P6\n1 1\n255\nabc");
+        bench
+    }
+
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub(super) fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("written");
+    }
+
+    pub(super) fn edit(&self, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path("scene.toml")).expect("the scene");
+        assert!(text.contains(from), "{from}");
+        self.write("scene.toml", &text.replace(from, to));
+    }
+
+    pub(super) fn send(&mut self) -> u64 {
+        self.generation += 1;
+        self.worker.send(Command::Render(Box::new(Request {
+            generation: self.generation,
+            scene: self.path(self.scene),
+            overrides: self.overrides.clone(),
+            preview: self.preview,
+            write: self.writing,
+            own: None,
+            force: self.force,
+            first: self.first,
+        })));
+        self.generation
+    }
+
+    pub(super) fn next(&self) -> Event {
+        let event = self.worker.events.recv_timeout(Duration::from_secs(60)).expect("the worker speaks");
+        if let Event::Settings { camera, .. } = &event {
+            self.own.set(Some(*camera));
+        }
+        event
+    }
+
+    /// All events up to the one that ends this generation.
+    pub(super) fn until_end(&self, of: u64) -> Vec<Event> {
+        let mut events = Vec::new();
+        loop {
+            let event = self.next();
+            let ends = matches!(&event,
+                Event::Done { generation, .. } | Event::Failed { generation, .. } | Event::Cancelled { generation }
+                if *generation == of);
+            events.push(event);
+            if ends {
+                return events;
+            }
+        }
+    }
+
+    pub(super) fn done(&mut self) -> (Report, bool) {
+        let of = self.send();
+        match self.until_end(of).pop() {
+            Some(Event::Done { report, unchanged, .. }) => (*report, unchanged),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(super) fn done_with_warnings(&mut self) -> (Report, Vec<Diagnostic>) {
+        let of = self.send();
+        match self.until_end(of).pop() {
+            Some(Event::Done { report, warnings, .. }) => (*report, warnings),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(super) fn failed(&mut self) -> Failure {
+        let of = self.send();
+        match self.until_end(of).pop() {
+            Some(Event::Failed { failure, .. }) => failure,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    pub(super) fn picture(&self) -> Vec<u8> {
+        fs::read(self.path("out.ppm")).expect("a picture")
+    }
+}
+
+/// `d`one, `r`eused or `s`kipped for each stage in order.
+pub(super) fn statuses(report: &Report) -> String {
+    let names: Vec<Stage> = report.stages.iter().map(|stage| stage.name).collect();
+    assert_eq!(names, Stage::ALL);
+    let letter = |status| match status {
+        Status::Done => 'd',
+        Status::Reused => 'r',
+        Status::Skipped => 's',
+        Status::Running => '?',
+    };
+    report.stages.iter().map(|stage| letter(stage.status)).collect()
+}
+
+#[track_caller]
+pub(super) fn assert_statuses(report: &Report, expected: &str) {
+    assert_eq!(statuses(report), expected, "parse meshes textures accel lights photons render write");
+}

@@ -1,0 +1,164 @@
+//! A scene that is switched away and back, and one picture of several that is saved.
+
+use super::*;
+use crate::settings::View;
+
+#[test]
+fn a_scene_that_is_switched_back_to_finds_its_trees_and_pictures() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("two.obj", &format!("{OBJ}f 1 3 2\n"));
+    bench.write("bark.ppm", "P6\n1 1\n255\nxyz");
+    bench.done();
+    let before = bench.picture();
+    let own = fs::read_to_string(bench.path("scene.toml")).expect("the scene");
+    let other = own.replace("one.obj", "two.obj").replace("skin.ppm", "bark.ppm");
+    bench.write("scene.toml", &other);
+    assert_statuses(&bench.done().0, "ddddrsdd");
+    for round in 0..2 {
+        bench.write("scene.toml", &own);
+        let report = bench.done().0;
+        assert_statuses(&report, "drrrrsrd");
+        assert_eq!(report.stages[Stage::Accel as usize].why, "its trees were kept", "round {round}");
+        assert_eq!(report.counters.texels_loaded, 0);
+        assert_eq!(bench.picture(), before);
+        bench.write("scene.toml", &other);
+        assert_statuses(&bench.done().0, "drrrrsrd");
+    }
+}
+
+#[test]
+fn a_scene_that_broke_on_the_way_finds_its_trees_too() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("two.obj", &format!("{OBJ}f 1 3 2\n"));
+    bench.done();
+    let own = fs::read_to_string(bench.path("scene.toml")).expect("the scene");
+    bench.edit("one.obj", "two.obj");
+    bench.done();
+    bench.edit("two.obj", "three.obj");
+    for _ in 0..3 {
+        bench.failed();
+    }
+    bench.write("scene.toml", &own);
+    assert_statuses(&bench.done().0, "drrrrsrd");
+}
+
+#[test]
+fn of_several_pictures_only_the_one_that_was_saved_is_read() {
+    let other = "[textures.bark]\nfile = \"bark.ppm\"\n[materials.trunk]\ndiffuse = { texture = \"bark\" }\n\
+                 [[sphere]]\ncenter = [1, 1, 0]\nradius = 0.2\nmaterial = \"trunk\"\n";
+    let mut bench = Bench::new(&format!("{SCENE}{other}"));
+    bench.write("bark.ppm", "P6\n2 1\n255\nxyzxyz");
+    let report = bench.done().0;
+    assert_eq!((report.counters.texels_loaded, &*report.stages[2].why), (3, "2 loaded"));
+    for (name, text, texels) in
+        [("bark.ppm", "P6\n2 1\n255\nabcxyz", 2), ("skin.ppm", "P6\n1 1\n255\nxyz", 1)]
+    {
+        bench.write(name, text);
+        let report = bench.done().0;
+        assert_statuses(&report, "rrdrrsdd");
+        assert_eq!((report.counters.texels_loaded, &*report.stages[2].why), (texels, "1 loaded, 1 kept"));
+    }
+}
+
+/// A lamp with two texels of bumps, three of light and four of a highlight; the ball has one.
+const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
+    [textures.gloss]\nfile = \"gloss.ppm\"\n\
+    [materials.lamp]\nspecular = { texture = \"gloss\" }\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
+    [[quad]]\nmaterial = \"lamp\"\n";
+
+const AMBIENT: &str = "\nambient = [0.1, 0.1, 0.1]";
+
+/// A bench with the files of [`BUMPY`], and a view.
+fn bumpy(scene: &str, view: View) -> Bench {
+    let mut bench = Bench::new(scene);
+    bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");
+    bench.write("glow.ppm", "P6\n3 1\n255\nabcabcabc");
+    bench.write("gloss.ppm", "P6\n4 1\n255\nabcabcabcabc");
+    bench.overrides.view = Some(view);
+    bench
+}
+
+/// The textures stage and the texels loaded, for a view of a scene that is seen for the first time.
+fn textures_of(scene: &str, view: View) -> (char, String, u64) {
+    let report = bumpy(scene, view).done().0;
+    let stage = &report.stages[Stage::Textures as usize];
+    let status = statuses(&report).chars().nth(Stage::Textures as usize).expect("a stage");
+    (status, stage.why.clone(), report.counters.texels_loaded)
+}
+
+#[test]
+fn a_view_loads_the_textures_that_it_shows() {
+    let bumpy = &format!("{SCENE}{BUMPY}");
+    let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
+    let said = |status, why: &str, texels| (status, why.to_owned(), texels);
+    let nothing = said('s', "the view shows no texture", 0);
+    // No photons are sent, and no ambient light is reflected.
+    for view in [View::Depth, View::Uv, View::Barycentric, View::Photons, View::Ambient] {
+        assert_eq!(textures_of(bumpy, view), nothing, "{view:?}");
+    }
+    for view in [View::Normal, View::Shadow, View::Emission] {
+        assert_eq!(textures_of(SCENE, view), nothing, "{view:?}");
+    }
+    assert_eq!(textures_of(bumpy, View::Normal), said('d', "1 loaded, 3 not shown", 2));
+    assert_eq!(textures_of(bumpy, View::Albedo), said('d', "1 loaded, 3 not shown", 1));
+    // What lamps send is a part of what arrives, what surfaces reflect is not.
+    assert_eq!(textures_of(bumpy, View::Shadow), said('d', "2 loaded, 2 not shown", 5));
+    assert_eq!(textures_of(bumpy, View::Emission), said('d', "1 loaded, 3 not shown", 3));
+    assert_eq!(textures_of(&ambient(bumpy), View::Ambient), said('d', "1 loaded, 3 not shown", 1));
+    // The boxes are drawn over the picture, and the colour of a lobe says how often it is sampled.
+    for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
+        assert_eq!(textures_of(bumpy, view), said('d', "4 loaded", 10), "{view:?}");
+    }
+    let photons = &format!("{bumpy}[photons]\nenabled = true\ncount = 100\n");
+    assert_eq!(textures_of(photons, View::Photons), said('d', "4 loaded", 10));
+    for view in [View::Emission, View::Albedo] {
+        assert_eq!(textures_of(photons, view), textures_of(bumpy, view), "{view:?}");
+    }
+}
+
+#[test]
+fn a_view_looks_up_no_texture_that_it_does_not_load() {
+    let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
+    for (view, scene) in [
+        (View::Shadow, SCENE.to_owned()),
+        (View::Emission, SCENE.to_owned()),
+        (View::Emission, ambient(SCENE)),
+        (View::Ambient, SCENE.to_owned()),
+        (View::Photons, SCENE.to_owned()),
+    ] {
+        let mut bench = Bench::new(&scene);
+        bench.overrides.view = Some(view);
+        let counters = bench.done().0.counters;
+        assert_eq!((counters.texels_loaded, counters.texture_lookups), (0, 0), "{view:?}");
+    }
+    let mut bench = Bench::new(&ambient(SCENE));
+    bench.overrides.view = Some(View::Ambient);
+    let counters = bench.done().0.counters;
+    assert!(counters.texels_loaded == 1 && counters.texture_lookups > 0, "{counters:?}");
+}
+
+#[test]
+fn a_view_without_textures_shows_what_it_would_with_them() {
+    let bumpy_scene = format!("{SCENE}{BUMPY}").replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
+    for view in
+        [View::Normal, View::Depth, View::Uv, View::Shadow, View::Albedo, View::Ambient, View::Emission]
+    {
+        for scene in [SCENE, &bumpy_scene] {
+            // A black texel reflects nothing; what arrives there is shown all the same.
+            let bench = |view| {
+                let bench = bumpy(scene, view);
+                bench.write("skin.ppm", "P6\n1 1\n255\n\0\0\0");
+                bench
+            };
+            let mut without = bench(view);
+            without.done();
+            // All that the picture showed stays loaded, so that lights and trees over them do too.
+            let mut with = bench(View::Beauty);
+            with.done();
+            with.overrides.view = Some(view);
+            let report = with.done().0;
+            assert_eq!(statuses(&report).chars().nth(Stage::Textures as usize), Some('r'), "{view:?}");
+            assert_eq!(with.picture(), without.picture(), "{view:?}");
+        }
+    }
+}

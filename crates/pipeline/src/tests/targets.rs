@@ -1,0 +1,216 @@
+//! Tests of files that are never overwritten.
+
+use std::ops::Range;
+use std::os::unix::fs::symlink;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::*;
+use crate::control::{CancelToken, Cancelled};
+use crate::film::{Pixels, TileSamples};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
+use crate::output::FileIdentity;
+use crate::protocol::CheckpointNews;
+use crate::settings::Checkpoints;
+use crate::turntable::Turn;
+use crate::world::World;
+
+/// The first conflicts reported, and the end of the request.
+fn conflicts_and_end(events: &[Event]) -> (Vec<String>, Option<&Event>) {
+    let conflicts = events.iter().find_map(|event| match event {
+        Event::Refused { conflicts, .. } => Some(conflicts.iter().map(|one| one.message.clone()).collect()),
+        _ => None,
+    });
+    (conflicts.unwrap_or_default(), events.last())
+}
+
+#[test]
+fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
+    let mut bench = Bench::new(SCENE);
+    let (good, report) = (bench.path("good.png"), bench.path("r.json"));
+    bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
+    bench.overrides.report = Some(report.clone());
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
+    bench.writing = Writing::Try;
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let (conflicts, end) = conflicts_and_end(&events);
+    assert!(conflicts.len() == 1 && conflicts[0].contains("texture `skin`"), "{conflicts:?}");
+    let said = |event: &Event| matches!(event, Event::Refused { .. });
+    let shown = events.iter().position(|event| matches!(event, Event::Preview { .. })).expect("it is shown");
+    assert!(events.iter().position(said).expect("it is said") < shown, "before the work");
+    assert_eq!(events.iter().filter(|event| said(event)).count(), 1, "once");
+    let Some(Event::Done { report: made, warnings, .. }) = end else { panic!("{end:?}") };
+    assert_eq!((made.image.path.as_deref(), made.image.complete), (None, true));
+    assert_eq!(made.stages[Stage::Write as usize].status, Status::Skipped);
+    assert!(warnings.iter().any(|one| one.message == conflicts[0]), "it holds to the end");
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Refused { .. }), "by hand neither");
+    assert!(!good.exists() && !report.exists(), "nothing is written");
+    // An edit ends it.
+    bench.edit("[textures.skin]\nfile = \"skin.ppm\"\n", "");
+    bench.edit("{ texture = \"skin\" }", "[0.5, 0.5, 0.5]");
+    let of = bench.send();
+    let events = bench.until_end(of);
+    assert!(conflicts_and_end(&events).0.is_empty());
+    assert!(good.exists() && report.exists(), "{events:?}");
+}
+
+#[test]
+fn a_material_file_is_known_before_the_render() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("mtl.json", "newmtl a\nmap_d alpha.ppm\n");
+    bench.write("one.obj", &format!("mtllib mtl.json\n{OBJ}"));
+    // Whatever the call lets it replace.
+    bench.overrides.replaces_foreign = true;
+    for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "a picture")] {
+        bench.overrides.report = Some(bench.path(name));
+        let of = bench.send();
+        let events = bench.until_end(of);
+        let Some(Event::Failed { failure: Failure::Scene(errors), .. }) = events.last() else {
+            panic!("{name}")
+        };
+        assert!(errors[0].message.contains(role), "{name}: {errors:?}");
+        assert!(!events.iter().any(|event| matches!(event, Event::Progress { .. })), "nothing is rendered");
+    }
+    assert!(!bench.path("alpha.ppm").exists());
+}
+
+#[test]
+fn nothing_that_is_watched_can_be_written() {
+    let mut bench = Bench::new(SCENE);
+    bench.write("one.obj", &format!("mtllib one.mtl gone.mtl\n{OBJ}"));
+    bench.write("one.mtl", "newmtl a\n");
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let files = events.iter().rev().find_map(|event| match event {
+        Event::Files { files, .. } => Some(files.clone()),
+        _ => None,
+    });
+    let files = files.expect("files");
+    assert_eq!(files.len(), 5, "{files:?}");
+    for file in files {
+        assert!(FileIdentity::of(&file.path).is_some(), "{file:?}");
+        bench.overrides.report = Some(file.path.clone());
+        assert!(matches!(bench.failed(), Failure::Scene(_)), "{file:?}");
+    }
+    // What a broken scene names is waited for, and the picture of the scene before cannot become it.
+    bench.overrides.report = None;
+    bench.overrides.outputs = vec![bench.path("later.ppm")];
+    bench.done();
+    fs::remove_file(bench.path("later.ppm")).expect("removed");
+    bench.edit("skin.ppm", "later.ppm");
+    bench.failed();
+    assert!(matches!(bench.next(), Event::LastGoodEnded { .. }));
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Refused { .. }));
+    assert!(!bench.path("later.ppm").exists());
+}
+
+static LINK: std::sync::Mutex<Option<PathBuf>> = std::sync::Mutex::new(None);
+static IS_LINKED: AtomicBool = AtomicBool::new(false);
+
+/// During the first tile the link comes to lead to the texture.
+fn relinks(
+    photons: Option<&PhotonMaps>,
+    world: &World,
+    settings: &RenderSettings,
+    pixels: Pixels,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    if let Some(link) = LINK.lock().expect("not poisoned").as_ref()
+        && !IS_LINKED.swap(true, Ordering::SeqCst)
+    {
+        fs::remove_file(link).expect("removed");
+        symlink("skin.ppm", link).expect("a link");
+    }
+    KERNEL(photons, world, settings, pixels, samples, token)
+}
+
+#[test]
+fn a_link_that_changes_during_the_render_is_seen_before_the_write() {
+    let mut bench = Bench::with(SCENE, relinks);
+    let link = bench.path("out.ppm");
+    symlink("elsewhere.ppm", &link).expect("a link");
+    *LINK.lock().expect("not poisoned") = Some(link);
+    let before = fs::read(bench.path("skin.ppm")).expect("a texture");
+    let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
+    assert!(errors[0].message.contains("texture `skin`"), "{errors:?}");
+    assert!(IS_LINKED.load(Ordering::SeqCst), "after the render began");
+    assert_eq!(fs::read(bench.path("skin.ppm")).expect("a texture"), before);
+    assert!(!bench.path("elsewhere.ppm").exists());
+}
+
+#[test]
+fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
+    let mut bench = Bench::new(SCENE);
+    let output = bench.path("out.ppm");
+    bench.done();
+    bench.edit("\"skin.ppm\"", "\"out.ppm\"\nbogus = 1");
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    assert!(matches!(bench.next(), Event::LastGoodEnded { .. }));
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Written { .. }), "nothing is lost");
+    assert!(matches!(bench.next(), Event::WriteDone { .. }));
+    fs::write(&output, "a picture of somebody else").expect("written");
+    bench.worker.send(Command::Write);
+    let Event::WriteFailed { message, .. } = bench.next() else { panic!("it is refused") };
+    assert!(message.contains("out.ppm") && message.contains("the scene has errors"), "{message}");
+    assert_eq!(fs::read(&output).expect("there"), b"a picture of somebody else");
+    // Where nothing is, nothing is lost.
+    fs::remove_file(&output).expect("removed");
+    bench.worker.send(Command::Write);
+    assert!(matches!(bench.next(), Event::Written { .. }));
+}
+
+#[test]
+fn a_finished_part_is_never_taken_for_a_checkpoint() {
+    let mut bench = Bench::new(SCENE);
+    let (out, part) = (bench.path("out"), bench.path("out.checkpoint"));
+    bench.overrides.shard = Some((2, 2));
+    bench.overrides.outputs = vec![part.clone()];
+    bench.done();
+    let before = fs::read(&part).expect("a part");
+    bench.overrides.shard = Some((1, 2));
+    bench.overrides.outputs = vec![out.clone()];
+    bench.overrides.checkpoints = Checkpoints { seconds: 1e-9, are_kept: true, ..Checkpoints::default() };
+    let of = bench.send();
+    let events = bench.until_end(of);
+    assert_eq!(fs::read(&part).expect("a part"), before);
+    assert!(matches!(events.last(), Some(Event::Done { .. })) && out.exists());
+    let failed = events.iter().find_map(|event| match event {
+        Event::Checkpoint { news: CheckpointNews::Failed { message }, .. } => Some(message),
+        _ => None,
+    });
+    assert!(failed.is_some_and(|message| message.contains("is a finished part")), "{failed:?}");
+}
+
+#[test]
+fn a_report_beside_a_checkpoint_is_refused_before_the_work() {
+    let mut bench = Bench::with(SCENE, unused);
+    bench.overrides.report = Some(bench.path("out.ppm.checkpoint"));
+    let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
+    assert!(errors[0].message.contains("it is the checkpoint of"), "{errors:?}");
+}
+
+#[test]
+fn a_later_image_of_a_turntable_that_is_blocked_is_found_before_the_work() {
+    let mut bench = Bench::with(SCENE, unused);
+    bench.overrides.outputs = vec![bench.path("a_##.ppm")];
+    bench.overrides.turn = Some(Turn { number: 0, of: 12 });
+    fs::create_dir(bench.path("a_09.ppm")).expect("a folder");
+    let Failure::Work(message) = bench.failed() else { panic!("a target") };
+    assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");
+}
+
+/// A kernel that no test reaches.
+fn unused(
+    _: Option<&PhotonMaps>,
+    _: &World,
+    _: &RenderSettings,
+    _: Pixels,
+    _: Range<u32>,
+    _: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    panic!("the work begins");
+}

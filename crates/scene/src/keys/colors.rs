@@ -1,0 +1,55 @@
+//! Colours as text.
+
+use csscolorparser::NAMED_COLORS;
+
+/// The names of colours, in small letters (CSS Color Module Level 4, 6.1).
+pub fn color_names() -> impl Iterator<Item = &'static str> {
+    NAMED_COLORS.keys().map(|name| name.as_str())
+}
+
+/// The sRGB bytes of a colour as a scene writes it: `#rrggbb`, or a name in any case.
+pub fn color_bytes(text: &str) -> Option<[u8; 3]> {
+    rgb_bytes(text).or_else(|| named(text))
+}
+
+/// The bytes of `#rrggbb`.
+fn rgb_bytes(text: &str) -> Option<[u8; 3]> {
+    let digits = hex_digits(text).filter(|digits| digits.len() == 6)?;
+    let number = u32::from_str_radix(digits, 16).ok()?;
+    let [_, red, green, blue] = number.to_be_bytes();
+    Some([red, green, blue])
+}
+
+/// The hexadecimal digits after a `#`.
+pub(crate) fn hex_digits(text: &str) -> Option<&str> {
+    text.strip_prefix('#').filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))
+}
+
+fn named(name: &str) -> Option<[u8; 3]> {
+    let found = NAMED_COLORS.entries().find(|(known, _)| known.as_str().eq_ignore_ascii_case(name));
+    found.map(|(_, bytes)| *bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_those_of_css_in_any_case() {
+        assert_eq!(color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
+        assert_eq!(color_bytes("DarkSlateGrey"), color_bytes("darkslategray"));
+        assert_eq!(color_names().count(), 148);
+        for wrong in ["", "transparent", "fff", "bad", "rgb(0,0,0)", "red "] {
+            assert_eq!(color_bytes(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn only_six_digits_are_a_colour() {
+        assert_eq!(color_bytes("#ff8000"), Some([255, 128, 0]));
+        assert_eq!(color_bytes("#FF80aa"), Some([255, 128, 170]));
+        for wrong in ["", "#", "ff8000", "#ff800", "#ff80000", "#gg8000", "#+f8000", "#ä1234"] {
+            assert_eq!(color_bytes(wrong), None, "{wrong}");
+        }
+    }
+}

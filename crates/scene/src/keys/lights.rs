@@ -1,0 +1,88 @@
+//! `[[light]]`.
+
+use super::key::Default::Is;
+use super::key::Kind::{Color, Number, Numbers, Words};
+use super::key::{Form, TableInfo, TypeInfo, key, words};
+use super::limits::Limits::{Any, AtLeast, Between, Inside};
+use crate::description::light::Falloff;
+
+pub(super) const LIGHT: TableInfo = TableInfo {
+    name: "light",
+    form: Form::List,
+    doc: "A light without a shape",
+    keys: &[],
+    types: &[
+        TypeInfo {
+            name: "point",
+            doc: "A light without extent",
+            keys: &[
+                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Its place"),
+                key(
+                    "intensity",
+                    Color(AtLeast(0.0)),
+                    "W/sr",
+                    Is("[10, 10, 10]"),
+                    "Radiant intensity, the same in all directions",
+                ),
+                key(
+                    "falloff",
+                    Words(words::<Falloff>),
+                    "",
+                    Is("\"square\""),
+                    "`\"square\"`: with the square of the distance, as in nature; `\"none\"`: `intensity` is the irradiance at normal incidence, at any distance",
+                ),
+            ],
+        },
+        TypeInfo {
+            name: "spot",
+            doc: "A light without extent that shines into a cone",
+            keys: &[
+                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Its place"),
+                key("look_at", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "A point on its axis"),
+                key(
+                    "intensity",
+                    Color(AtLeast(0.0)),
+                    "W/sr",
+                    Is("[10, 10, 10]"),
+                    "Radiant intensity on the axis",
+                ),
+                key("angle", Number(Inside(0.0, 360.0)), "degrees", Is("45"), "The whole cone"),
+                key(
+                    "blend",
+                    Number(Between(0.0, 1.0)),
+                    "part of the half angle",
+                    Is("0.2"),
+                    "The outer part of the cone over which the light fades",
+                ),
+                key("falloff", Words(words::<Falloff>), "", Is("\"square\""), "As for a point light"),
+            ],
+        },
+        TypeInfo {
+            name: "directional",
+            doc: "Light from far away, as of the sun",
+            keys: &[
+                key(
+                    "direction",
+                    Numbers(3, "direction", Any),
+                    "",
+                    Is("[0, -1, 0]"),
+                    "The way that light travels",
+                ),
+                key(
+                    "irradiance",
+                    Color(AtLeast(0.0)),
+                    "W/m²",
+                    Is("[1, 1, 1]"),
+                    "Irradiance at normal incidence",
+                ),
+                key(
+                    "angle",
+                    Number(Between(0.0, 180.0)),
+                    "degrees",
+                    Is("0"),
+                    "Apparent diameter, 0 or at least 0.001; the sun has 0.53. Above 0 shadows are soft and the disc is seen",
+                ),
+            ],
+        },
+    ],
+};

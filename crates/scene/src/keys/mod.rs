@@ -1,0 +1,140 @@
+//! The one definition of the keys of a scene file: names, values, units, defaults, descriptions. The reader takes its words and
+//! ranges from here; colours and vectors outside of materials have the ranges of their types. A test compares these, and the
+//! defaults, with the reader. The schema, `glimt explain`, completions and the pages are made from the definition or compared with it.
+
+mod colors;
+pub mod endings;
+pub mod key;
+mod lights;
+pub mod limits;
+mod materials;
+mod render;
+mod shapes;
+mod singles;
+mod textures;
+
+use std::sync::LazyLock;
+
+pub(super) use colors::hex_digits;
+pub use colors::{color_bytes, color_names};
+pub use key::{Default, Form, KeyInfo, Kind, TableInfo, TypeInfo, Word, WordList, words};
+
+/// All tables, in the order in which the pages have them.
+pub fn tables() -> &'static [TableInfo] {
+    static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
+        let before = [render::table(), singles::CAMERA, singles::PHOTONS];
+        let named = [textures::TEXTURES, materials::MATERIALS];
+        let shapes = shapes::SHAPES.iter().cloned();
+        let lights = [lights::LIGHT, singles::ENVIRONMENT];
+        before.into_iter().chain(named).chain(shapes).chain(lights).collect()
+    });
+    &TABLES
+}
+
+/// The paths of all tables, types and keys, with their descriptions: `materials`, `materials.metal`, `materials.metal.roughness`.
+pub fn paths() -> Vec<(String, &'static str)> {
+    let mut all = Vec::new();
+    for table in tables() {
+        all.push((table.name.to_owned(), table.doc));
+        for key in table.keys {
+            all.push((format!("{}.{}", table.name, key.name), key.doc));
+        }
+        for kind in table.types {
+            let path = format!("{}.{}", table.name, kind.name);
+            all.extend(kind.keys.iter().map(|key| (format!("{path}.{}", key.name), key.doc)));
+            all.push((path, kind.doc));
+        }
+    }
+    all
+}
+
+/// The table of this name.
+pub fn table(name: &str) -> Option<&'static TableInfo> {
+    tables().iter().find(|table| table.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnostic::Severity;
+    use crate::parse;
+
+    /// Keys that a table needs beside a key, with values.
+    fn beside(table: &str, kind: &str, key: &str) -> Vec<(String, String)> {
+        let fixed: &[(&str, &str)] = match (table, kind, key) {
+            ("materials", "metal", "color" | "element") => &[],
+            ("materials", "metal", "eta") => &[("k", "[3, 2, 1]")],
+            ("materials", "metal", "k") => &[("eta", "[0.2, 0.9, 1.1]")],
+            ("materials", "metal", _) => &[("element", "\"gold\"")],
+            ("camera", _, "orbiter") => &[],
+            ("camera", ..) => &[("position", "[0, 1, 4]"), ("look_at", "[0, 1, 0]")],
+            ("textures", _, "image") | ("mesh", _, "part") => &[("file", "\"model.glb\"")],
+            _ => &[],
+        };
+        let pair = |(name, value): (&str, &str)| (name.to_owned(), value.to_owned());
+        let required =
+            super::table(table).into_iter().flat_map(|info| info.keys_of(info.type_of(Some(kind))));
+        let required =
+            required.filter(|info| table != "camera" && matches!(info.default, Default::Required(_)));
+        let required = required.map(|info| (info.name.to_owned(), info.example()));
+        let fixed: Vec<_> = fixed.iter().copied().map(pair).collect();
+        let is_other =
+            |all: &[(String, String)], name: &str| name != key && all.iter().all(|(one, _)| one != name);
+        let required: Vec<_> = required.filter(|(name, _)| is_other(&fixed, name)).collect();
+        fixed.into_iter().filter(|(name, _)| name != key).chain(required).collect()
+    }
+
+    /// A scene with a key's example.
+    fn with_example(info: &TableInfo, kind: Option<&TypeInfo>, key: &KeyInfo) -> String {
+        let mut text = String::new();
+        for (table, body) in [
+            ("camera", "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n"),
+            ("", "[textures.name]\nfile = \"a.png\"\n[materials.name]\n"),
+        ] {
+            if table != info.name {
+                text.push_str(body);
+            }
+        }
+        text.push_str(&info.head().replace("NAME", "other"));
+        if let Some(kind) = kind {
+            text.push_str(&format!("\ntype = \"{}\"", kind.name));
+        }
+        text.push_str(&format!("\n{} = {}\n", key.name, key.example()));
+        for (name, value) in beside(info.name, kind.map_or("", |kind| kind.name), key.name) {
+            text.push_str(&format!("{name} = {value}\n"));
+        }
+        text
+    }
+
+    #[test]
+    fn every_example_is_accepted() {
+        let (mut refused, folder) = (Vec::new(), tempfile::tempdir().expect("a folder"));
+        for info in tables() {
+            let kinds: Vec<_> = match info.types {
+                [] => vec![None],
+                types => types.iter().map(Some).collect(),
+            };
+            for kind in kinds {
+                for key in info.keys_of(kind) {
+                    // A glass that fills its shape is there everywhere.
+                    let is_glass = kind.is_some_and(|kind| kind.name == "glass");
+                    if is_glass && key.name.starts_with("opacity") {
+                        continue;
+                    }
+                    let text = with_example(info, kind, key);
+                    for name in text.split('"').skip(1).step_by(2).filter(|name| name.contains('.')) {
+                        std::fs::write(folder.path().join(name), "").expect("a file");
+                    }
+                    let found = parse(text.as_str().into(), &folder.path().join("a.toml")).diagnostics;
+                    refused.extend(
+                        found
+                            .iter()
+                            .filter(|one| one.severity == Severity::Error)
+                            .map(|one| format!("{}\n{text}", one.message)),
+                    );
+                }
+            }
+        }
+        assert!(refused.is_empty(), "{}", refused.join("\n"));
+    }
+}

@@ -1,0 +1,189 @@
+//! The frame of the terminal's window: its title, a bar of progress, notifications; and the clipboard.
+//!
+//! Each is sent only to terminals that are known to have it (see `terminals`), and behind the picture.
+
+use std::time::Duration;
+
+use super::graphics::base64;
+use super::state::{Activity, State};
+use super::terminals::Notice;
+use super::view;
+use crate::scene::sanitize::visible;
+
+/// Time after which title and progress show a render: a camera on its way is no news.
+const SHORT: Duration = Duration::from_millis(500);
+/// Step of the percentage over a line that takes time.
+const COARSE: u32 = 10;
+
+/// Bytes that keep the window's title for [`TITLE_BACK`].
+pub(super) const KEEP_TITLE: &[u8] = b"\x1b[22;2t";
+/// Bytes that give the window back the title that it had; where none was kept, its default one.
+pub(super) const TITLE_BACK: &[u8] = b"\x1b]2;\x1b\\\x1b[23;2t";
+/// Bytes that remove the bar of progress.
+pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
+
+/// A bar of progress.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Bar {
+    #[default]
+    None,
+    /// At work, nobody knows for how long.
+    Busy,
+    Percent(u32),
+    Paused(u32),
+    Broken,
+}
+
+impl Bar {
+    fn bytes(self) -> Vec<u8> {
+        let bar = |state: u8, percent: u32| format!("\x1b]9;4;{state};{percent}\x1b\\").into_bytes();
+        match self {
+            Self::None => PROGRESS_OFF.to_vec(),
+            Self::Percent(percent) => bar(1, percent),
+            Self::Broken => bar(2, 100),
+            Self::Busy => bar(3, 0),
+            Self::Paused(percent) => bar(4, percent),
+        }
+    }
+}
+
+/// Title and progress of the window, as far as the terminal has them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Chrome {
+    pub(super) title: Option<String>,
+    pub(super) bar: Option<Bar>,
+}
+
+impl Chrome {
+    /// Title, progress and links of the state; `is_slow` says that the line takes time. `None` if they stay as they are.
+    pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
+        let abilities = state.display.abilities;
+        if state.work.running_for(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
+            return None;
+        }
+        let progress = state.work.progress.as_ref().filter(|_| state.work.is_running());
+        let step = if is_slow { COARSE } else { 1 };
+        let percent = progress.map(|progress| view::text::percent(progress.fraction) / step * step);
+        Some(Self {
+            title: abilities.title.then(|| title(state, percent)),
+            bar: abilities.progress.then(|| bar(state, percent)),
+        })
+    }
+
+    /// Bytes that lead from one to another.
+    pub(super) fn changes(&self, to: &Self) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if let Some(title) = to.title.as_ref().filter(|_| self.title != to.title) {
+            bytes.extend_from_slice(format!("\x1b]2;{}\x1b\\", visible(title)).as_bytes());
+        }
+        if let Some(bar) = to.bar.filter(|_| self.bar.unwrap_or_default() != to.bar.unwrap_or_default()) {
+            bytes.extend(bar.bytes());
+        }
+        bytes
+    }
+}
+
+/// `cornell.toml: rendering 38 % · glimt`.
+fn title(state: &State, percent: Option<u32>) -> String {
+    let word = view::state_word(state);
+    let percent = percent.map_or(String::new(), |percent| format!(" {percent} %"));
+    format!("{}: {word}{percent} · glimt", name(state))
+}
+
+/// The scene's name.
+fn name(state: &State) -> String {
+    let name = state.request.scene.file_name().unwrap_or(state.request.scene.as_os_str());
+    visible(&name.to_string_lossy()).into_owned()
+}
+
+fn bar(state: &State, percent: Option<u32>) -> Bar {
+    match state.work.activity {
+        Activity::Running { .. } if state.work.paused => Bar::Paused(percent.unwrap_or(0)),
+        Activity::Running { .. } => percent.map_or(Bar::Busy, Bar::Percent),
+        Activity::Broken => Bar::Broken,
+        Activity::Done | Activity::Waiting | Activity::Cancelled => Bar::None,
+    }
+}
+
+/// Bytes of a notification that a render has ended, after so long.
+pub(super) fn notice(state: &State, notice: Notice, time: Duration) -> Vec<u8> {
+    let words = format!("{}: {} after {}", name(state), view::state_word(state), view::text::duration(time));
+    match notice {
+        Notice::Osc9 => format!("\x1b]9;glimt: {words}\x1b\\").into_bytes(),
+        Notice::Osc99 => format!("\x1b]99;;glimt: {words}\x1b\\").into_bytes(),
+        Notice::Osc777 => format!("\x1b]777;notify;glimt;{words}\x1b\\").into_bytes(),
+        Notice::Bell => b"\x07".to_vec(),
+    }
+}
+
+/// Bytes that put a text into the clipboard.
+pub(super) fn copy(text: &str) -> Vec<u8> {
+    [b"\x1b]52;c;", &*base64::encoded(text.as_bytes()), b"\x1b\\"].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{Desk, progress};
+    use crate::pipeline::protocol::Event;
+    use crate::terminals::{Abilities, Brand, Terminal};
+
+    fn desk() -> Desk {
+        let mut desk = Desk::new();
+        desk.state.display.abilities = Terminal { brand: Brand::Ghostty, version: [1, 2] }.abilities();
+        desk
+    }
+
+    fn sent(before: &mut Chrome, desk: &Desk, is_slow: bool) -> String {
+        let now = Chrome::of(&desk.state, is_slow).unwrap_or_else(|| before.clone());
+        let bytes = before.changes(&now);
+        *before = now;
+        String::from_utf8(bytes).expect("UTF-8")
+    }
+
+    #[test]
+    fn the_window_says_what_is_going_on() {
+        let (mut desk, mut chrome) = (desk(), Chrome::default());
+        assert_eq!(sent(&mut chrome, &desk, false), "", "a short render is no news");
+        desk.wait(600);
+        let busy = "\x1b]2;cornell.toml: rendering · glimt\x1b\\\x1b]9;4;3;0\x1b\\";
+        assert_eq!(sent(&mut chrome, &desk, false), busy);
+        desk.worker(Event::Progress { generation: 1, progress: progress(0.389, None) });
+        let part = "\x1b]2;cornell.toml: rendering 38 % · glimt\x1b\\\x1b]9;4;1;38\x1b\\";
+        assert_eq!(sent(&mut chrome, &desk, false), part);
+        let coarse = "\x1b]2;cornell.toml: rendering 30 % · glimt\x1b\\\x1b]9;4;1;30\x1b\\";
+        assert_eq!(sent(&mut chrome, &desk, true), coarse);
+        desk.press(' ');
+        let held = "\x1b]2;cornell.toml: paused 30 % · glimt\x1b\\\x1b]9;4;4;30\x1b\\";
+        assert_eq!(sent(&mut chrome, &desk, true), held);
+        desk.press(' ');
+        desk.finish([200, 30, 30]);
+        let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
+        assert_eq!(sent(&mut chrome, &desk, false), done);
+        assert_eq!(sent(&mut chrome, &desk, false), "", "nothing when nothing changes");
+        desk.fail(Vec::new());
+        desk.event(crate::event::Event::Settled);
+        assert!(sent(&mut chrome, &desk, false).contains("\x1b]9;4;2;100\x1b\\"));
+    }
+
+    #[test]
+    fn a_terminal_without_abilities_gets_nothing() {
+        let (mut desk, mut chrome) = (Desk::new(), Chrome::default());
+        assert_eq!(desk.state.display.abilities, Abilities::default());
+        desk.finish([200, 30, 30]);
+        assert_eq!(sent(&mut chrome, &desk, false), "");
+    }
+
+    #[test]
+    fn names_of_files_end_no_sequence() {
+        let mut desk = desk();
+        desk.state.request.scene = "a\x1b\\\x07b.toml".into();
+        desk.finish([200, 30, 30]);
+        let title = sent(&mut Chrome::default(), &desk, false);
+        assert_eq!(title, "\x1b]2;a␛\\␇b.toml: done · glimt\x1b\\");
+        let bytes = notice(&desk.state, Notice::Osc777, Duration::from_secs(95));
+        let words = String::from_utf8(bytes).expect("UTF-8");
+        assert_eq!(words, "\x1b]777;notify;glimt;a␛\\␇b.toml: done after 1 min 35 s\x1b\\");
+        assert_eq!(copy("a b"), b"\x1b]52;c;YSBi\x1b\\");
+    }
+}

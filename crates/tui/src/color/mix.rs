@@ -1,0 +1,158 @@
+//! Colours that a terminal does not have, mixed by the eye from those that it has.
+//!
+//! For each colour a recipe of [`PARTS`] inks is found whose mean in linear light is the colour, and whose inks are as
+//! near to it, and so to each other, as that allows: the remaining error is fed back from one ink to the next (after
+//! J. Yliluoma and T. Knoll, "pattern dithering"), in Oklab linearised at the colour. The parts are sorted by lightness,
+//! and a threshold picks one of them: the same at the same place, whatever its neighbours are.
+
+use std::collections::HashMap;
+
+use super::oklab::{Slope, oklab};
+use crate::math::Vec3;
+use crate::math::color::srgb8_to_linear;
+
+/// Inks in a recipe.
+pub(super) const PARTS: usize = 16;
+/// Inks that are looked at for a recipe: those nearest to the colour.
+const NEAREST: usize = 32;
+/// Most recipes that are kept.
+const MOST_RECIPES: usize = 1 << 16;
+
+/// An ink: a colour or a pattern to mix from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ink {
+    linear: Vec3,
+    lab: Vec3,
+    /// Its distance from a single colour, squared.
+    texture: f32,
+}
+
+impl Ink {
+    /// One colour.
+    pub(super) fn plain(rgb: [u8; 3]) -> Self {
+        let linear = srgb8_to_linear(rgb);
+        Self { linear, lab: oklab(linear), texture: 0.0 }
+    }
+
+    /// A share of one ink in another, in a fine pattern.
+    pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
+        /// A pattern within a cell is seen less than one of cells.
+        const FINENESS: f32 = 0.25;
+        let linear = front.linear * share + back.linear * (1.0 - share);
+        let lab = oklab(linear);
+        let texture =
+            share * front.lab.distance_squared(lab) + (1.0 - share) * back.lab.distance_squared(lab);
+        Self { linear, lab, texture: texture * FINENESS }
+    }
+}
+
+/// The recipes from some inks.
+#[derive(Debug, Default)]
+pub(super) struct Mixer {
+    inks: Vec<Ink>,
+    /// Weight of the distance between inks, beside the distance of their mean.
+    calm: f32,
+    recipes: HashMap<[u8; 3], [u16; PARTS]>,
+}
+
+impl Mixer {
+    /// From these. `calm`: from 0, where only the mean counts, up; then the nearest ink counts more and more.
+    pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
+        Self { inks, calm, recipes: HashMap::new() }
+    }
+
+    /// The index of the ink for a colour where the threshold, in (0, 1), is this.
+    pub(super) fn ink(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
+        let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
+        let recipe = match self.recipes.get(&rgb) {
+            Some(recipe) => *recipe,
+            None => self.remember(rgb),
+        };
+        usize::from(recipe[part])
+    }
+
+    fn remember(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
+        if self.recipes.len() >= MOST_RECIPES {
+            self.recipes.clear();
+        }
+        let recipe = self.recipe(rgb);
+        self.recipes.insert(rgb, recipe);
+        recipe
+    }
+
+    fn recipe(&self, rgb: [u8; 3]) -> [u16; PARTS] {
+        let linear = srgb8_to_linear(rgb);
+        let lab = oklab(linear);
+        let slope = Slope::at(linear);
+        let mut near: Vec<(f32, usize)> = self
+            .inks
+            .iter()
+            .enumerate()
+            .map(|(index, ink)| (ink.lab.distance_squared(lab) + ink.texture, index))
+            .collect();
+        let most = NEAREST.min(near.len());
+        if most < near.len() {
+            near.select_nth_unstable_by(most, |a, b| a.0.total_cmp(&b.0));
+        }
+        near.truncate(most);
+        // Of equally good inks the first.
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let off: Vec<Vec3> =
+            near.iter().map(|(_, index)| slope.change(self.inks[*index].linear - linear)).collect();
+        let mut parts = [0_u16; PARTS];
+        let mut rest = Vec3::ZERO;
+        for part in &mut parts {
+            let cost = |i: usize| (rest + off[i]).length_squared() + self.calm * near[i].0;
+            let best = (0..near.len()).min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(0);
+            rest += off.get(best).copied().unwrap_or_default();
+            *part = near.get(best).map_or(0, |(_, index)| *index as u16);
+        }
+        let lightness = |index: &u16| self.inks.get(usize::from(*index)).map_or(0.0, |ink| ink.lab.x);
+        parts.sort_by(|a, b| lightness(a).total_cmp(&lightness(b)).then(a.cmp(b)));
+        parts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::palette;
+
+    fn cube() -> Mixer {
+        Mixer::new((16..=255).filter_map(palette::fixed).map(Ink::plain).collect(), 0.1)
+    }
+
+    #[test]
+    fn an_ink_stays_as_it_is() {
+        let mut mixer = cube();
+        for index in [0, 5, 100, 215, 230] {
+            let rgb = palette::fixed(16 + index).expect("a fixed colour");
+            for part in 0..PARTS {
+                let ink = mixer.ink(rgb, (part as f32 + 0.5) / PARTS as f32);
+                assert_eq!(palette::fixed(16 + ink as u8), Some(rgb));
+            }
+        }
+    }
+
+    #[test]
+    fn the_mean_of_a_recipe_is_the_colour() {
+        let mut mixer = cube();
+        for rgb in [[150, 75, 50], [101, 67, 33], [30, 60, 90], [200, 190, 180], [115, 115, 110]] {
+            let parts: Vec<usize> =
+                (0..PARTS).map(|part| mixer.ink(rgb, (part as f32 + 0.5) / PARTS as f32)).collect();
+            let mean = parts.iter().map(|ink| mixer.inks[*ink].linear).sum::<Vec3>() / PARTS as f32;
+            let off = oklab(mean).distance(oklab(srgb8_to_linear(rgb)));
+            assert!(off < 0.02, "{rgb:?}: {off}");
+        }
+    }
+
+    #[test]
+    fn inks_of_a_recipe_are_near_to_each_other() {
+        let mut mixer = cube();
+        let lab = oklab(srgb8_to_linear([150, 75, 50]));
+        for part in 0..PARTS {
+            let ink = mixer.ink([150, 75, 50], (part as f32 + 0.5) / PARTS as f32);
+            assert!(mixer.inks[ink].lab.distance(lab) < 0.15);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Oklab (Björn Ottosson, "A perceptual color space for image processing", 2020): distances are about as large as they
+//! look.
+
+use crate::math::Vec3;
+
+/// The response of the three kinds of cones to linear Rec. 709 RGB.
+const CONES: [Vec3; 3] = [
+    Vec3::new(0.412_221_46, 0.536_332_55, 0.051_445_995),
+    Vec3::new(0.211_903_5, 0.680_699_5, 0.107_396_96),
+    Vec3::new(0.088_302_46, 0.281_718_85, 0.629_978_7),
+];
+/// Lightness, red over green, yellow over blue of the cube roots of those.
+const LAB: [Vec3; 3] = [
+    Vec3::new(0.210_454_26, 0.793_617_8, -0.004_072_047),
+    Vec3::new(1.977_998_5, -2.428_592_2, 0.450_593_7),
+    Vec3::new(0.025_904_037, 0.782_771_77, -0.808_675_77),
+];
+
+fn product(rows: [Vec3; 3], v: Vec3) -> Vec3 {
+    Vec3::from_array(rows.map(|row| row.dot(v)))
+}
+
+/// Oklab of a linear colour.
+pub(crate) fn oklab(linear: Vec3) -> Vec3 {
+    let cones = product(CONES, linear.max(Vec3::ZERO));
+    product(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
+}
+
+/// Derivative of Oklab by linear light, around a colour. In the dark the derivative has no bound, and a smaller one is assumed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slope(Vec3);
+
+impl Slope {
+    /// Around this linear colour.
+    pub(super) fn at(linear: Vec3) -> Self {
+        const DARK: f32 = 0.01;
+        let cones = product(CONES, linear.max(Vec3::ZERO));
+        Self(Vec3::from_array(cones.to_array().map(|cone| {
+            let root = (cone + DARK).cbrt();
+            1.0 / (3.0 * root * root)
+        })))
+    }
+
+    /// The change of Oklab for a change of linear light.
+    pub(super) fn change(self, linear: Vec3) -> Vec3 {
+        product(LAB, self.0 * product(CONES, linear))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_is_lightness_one_without_hue() {
+        assert!(oklab(Vec3::ONE).distance(Vec3::new(1.0, 0.0, 0.0)) < 1e-3);
+        // Ottosson's table: the Y axis of XYZ is close to pure green of this space; red's lightness is 0.628.
+        assert!((oklab(Vec3::X).x - 0.628).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_slope_is_the_limit_of_differences() {
+        let color = Vec3::new(0.4, 0.2, 0.6);
+        let step = Vec3::new(1e-3, -2e-3, 1e-3);
+        let change = oklab(color + step) - oklab(color);
+        assert!(Slope::at(color).change(step).distance(change) < 0.1 * change.length());
+    }
+}

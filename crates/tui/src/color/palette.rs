@@ -1,0 +1,167 @@
+//! The colours of the palettes: 16 of the terminal's own, and xterm's cube and greys.
+
+use ratatui::style::Color;
+
+/// The levels of a channel in the 6×6×6 cube.
+pub(crate) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
+
+/// First of the colours that are the same everywhere: a cube.
+pub(crate) const FIRST_FIXED: u8 = 16;
+/// First grey.
+pub(crate) const FIRST_GREY: u8 = 232;
+
+/// The 16 colours of a terminal, in sRGB.
+pub(crate) type Ansi = [[u8; 3]; 16];
+
+/// The 16 colours as xterm draws them by default; people change them.
+pub(crate) const XTERM: Ansi = [
+    [0, 0, 0],
+    [205, 0, 0],
+    [0, 205, 0],
+    [205, 205, 0],
+    [0, 0, 238],
+    [205, 0, 205],
+    [0, 205, 205],
+    [229, 229, 229],
+    [127, 127, 127],
+    [255, 0, 0],
+    [0, 255, 0],
+    [255, 255, 0],
+    [92, 92, 255],
+    [255, 0, 255],
+    [0, 255, 255],
+    [255, 255, 255],
+];
+
+/// The 16 colours of the Linux console, which are those of the VGA.
+const VGA: Ansi = [
+    [0, 0, 0],
+    [170, 0, 0],
+    [0, 170, 0],
+    [170, 85, 0],
+    [0, 0, 170],
+    [170, 0, 170],
+    [0, 170, 170],
+    [170, 170, 170],
+    [85, 85, 85],
+    [255, 85, 85],
+    [85, 255, 85],
+    [255, 255, 85],
+    [85, 85, 255],
+    [255, 85, 255],
+    [85, 255, 255],
+    [255, 255, 255],
+];
+
+/// The likely 16 colours of a terminal that has not reported its own.
+pub(crate) fn ansi(term: &str) -> &'static Ansi {
+    if term.starts_with("linux") { &VGA } else { &XTERM }
+}
+
+/// sRGB values of a palette colour. `None` for the first 16, which are the user's.
+pub(crate) fn fixed(index: u8) -> Option<[u8; 3]> {
+    match index {
+        0..FIRST_FIXED => None,
+        FIRST_FIXED..FIRST_GREY => {
+            let i = usize::from(index - FIRST_FIXED);
+            Some([i / 36, i / 6 % 6, i % 6].map(|step| CUBE_LEVELS[step]))
+        }
+        FIRST_GREY.. => Some([8 + 10 * (index - FIRST_GREY); 3]),
+    }
+}
+
+/// sRGB values of a colour in xterm by default. `None` for the terminal's own colour.
+pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
+    let ansi = match color {
+        Color::Reset => return None,
+        Color::Rgb(r, g, b) => return Some([r, g, b]),
+        Color::Indexed(index) => return fixed(index).or_else(|| XTERM.get(usize::from(index)).copied()),
+        Color::Black => 0,
+        Color::Red => 1,
+        Color::Green => 2,
+        Color::Yellow => 3,
+        Color::Blue => 4,
+        Color::Magenta => 5,
+        Color::Cyan => 6,
+        Color::Gray => 7,
+        Color::DarkGray => 8,
+        Color::LightRed => 9,
+        Color::LightGreen => 10,
+        Color::LightYellow => 11,
+        Color::LightBlue => 12,
+        Color::LightMagenta => 13,
+        Color::LightCyan => 14,
+        Color::White => 15,
+    };
+    Some(XTERM[ansi])
+}
+
+/// The nearer of the nearest colour of the cube (16 to 231) and the nearest grey (232 to 255).
+pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
+    let steps = rgb.map(nearest_level);
+    let cube = steps.map(|step| CUBE_LEVELS[step]);
+    let mean = rgb.iter().map(|&channel| u32::from(channel)).sum::<u32>() / 3;
+    let grey_step = (mean.saturating_sub(8) + 5).min(235) / 10;
+    let grey_step = u8::try_from(grey_step.min(23)).unwrap_or(23);
+    let grey = [8 + 10 * grey_step; 3];
+    if difference(rgb, grey) < difference(rgb, cube) {
+        FIRST_GREY + grey_step
+    } else {
+        let index = 36 * steps[0] + 6 * steps[1] + steps[2];
+        FIRST_FIXED + u8::try_from(index).unwrap_or(215)
+    }
+}
+
+fn nearest_level(channel: u8) -> usize {
+    match channel {
+        0..48 => 0,
+        48..115 => 1,
+        _ => (usize::from(channel) - 35) / 40,
+    }
+}
+
+/// A weighted distance in sRGB that follows the eye well at the cost of a few products ("redmean",
+/// compuphase.com/cmetric.htm), squared.
+fn difference(a: [u8; 3], b: [u8; 3]) -> i32 {
+    let [dr, dg, db] = std::array::from_fn(|i| i32::from(a[i]) - i32::from(b[i]));
+    let mean_red = (i32::from(a[0]) + i32::from(b[0])) / 2;
+    (((512 + mean_red) * dr * dr) >> 8) + 4 * dg * dg + (((767 - mean_red) * db * db) >> 8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_indices_of_256() {
+        for (rgb, index) in [
+            ([0, 0, 0], 16),
+            ([255, 255, 255], 231),
+            ([255, 0, 0], 196),
+            ([0, 255, 0], 46),
+            ([0, 0, 255], 21),
+            ([95, 135, 175], 67),
+            ([8, 8, 8], 232),
+            ([238, 238, 238], 255),
+            ([118, 118, 118], 243),
+        ] {
+            assert_eq!(nearest_256(rgb), index, "{rgb:?}");
+            assert!(fixed(index).is_some_and(|fixed| difference(fixed, rgb) <= 36), "{rgb:?}");
+        }
+        assert_eq!(fixed(15), None);
+        let shown = [Color::Indexed(9), Color::LightRed, Color::Indexed(67), Color::Reset].map(in_xterm);
+        assert_eq!(shown, [Some([255, 0, 0]), Some([255, 0, 0]), Some([95, 135, 175]), None]);
+    }
+
+    #[test]
+    fn no_other_index_of_256_is_much_nearer() {
+        let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed).collect();
+        assert_eq!(palette.len(), 240);
+        for i in 0..4096_u32 {
+            let rgb = [0, 8, 16].map(|shift| (i.wrapping_mul(2_654_435_761) >> shift) as u8);
+            let got = difference(rgb, fixed(nearest_256(rgb)).expect("a fixed colour"));
+            let best = palette.iter().map(|&other| difference(rgb, other)).min().expect("240 colours");
+            assert!(f64::from(got).sqrt() <= f64::from(best).sqrt() + 12.0, "{rgb:?}: {got} {best}");
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! The order in which the places of a picture turn from one colour to the next.
+
+/// Columns and rows after which the pattern repeats.
+const SIDE: usize = 8;
+
+/// The threshold of a place, in (0, 1): Bayer's matrix ("An optimum method for two-level rendition of
+/// continuous-tone pictures", 1973). It hangs on the place alone, so that what does not change does not flicker.
+pub(super) fn threshold(x: usize, y: usize) -> f32 {
+    let (x, y) = (x % SIDE, y % SIDE);
+    let mixed = x ^ y;
+    let rank = (0..3).fold(0, |rank, bit| {
+        let pair = (mixed >> bit & 1) << 1 | (y >> bit & 1);
+        rank | pair << (2 * (2 - bit))
+    });
+    (rank as f32 + 0.5) / (SIDE * SIDE) as f32
+}
+
+/// A colour in six bits of a channel, dithered.
+pub(crate) fn finer(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
+    const LEVELS: u16 = 63;
+    let more = (threshold(x, y) * 255.0) as u16;
+    rgb.map(|channel| {
+        let level = (u16::from(channel) * LEVELS + more) / 255;
+        ((level * 255 + LEVELS / 2) / LEVELS) as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_rank_is_there_once_and_every_quarter_has_its_share() {
+        let mut ranks: Vec<u32> = (0..64).map(|i| (threshold(i % 8, i / 8) * 64.0) as u32).collect();
+        for corner in [(0, 0), (4, 0), (0, 4), (4, 4)] {
+            let below = (0..16).filter(|i| threshold(corner.0 + i % 4, corner.1 + i / 4) < 0.25).count();
+            assert_eq!(below, 4);
+        }
+        ranks.sort_unstable();
+        assert!(ranks.into_iter().eq(0..64));
+        assert_eq!(threshold(3, 5), threshold(11, 21));
+    }
+
+    #[test]
+    fn the_mean_of_finer_colours_is_the_colour() {
+        assert_eq!((finer([0; 3], 3, 4), finer([255; 3], 3, 4)), ([0; 3], [255; 3]));
+        let sum: u32 = (0..64).map(|i| u32::from(finer([101; 3], i % 8, i / 8)[0])).sum();
+        assert!(sum.abs_diff(101 * 64) <= 64, "{sum}");
+    }
+}

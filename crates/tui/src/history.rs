@@ -1,0 +1,753 @@
+//! The last pictures, within bounds.
+
+use std::cell::OnceCell;
+use std::collections::{HashMap, VecDeque};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::film::Picture;
+use crate::pipeline::protocol::{PreviewSource, Section};
+use crate::rescale::resized;
+use crate::state::Origin;
+
+/// Bytes that all of them take, at most.
+const MOST_BYTES: usize = 16 << 20;
+/// Columns and rows of a small picture, at most: as fine as octants draw it.
+const SMALL: f32 = 32.0;
+
+/// Change of a picture that differs from the one before in nothing but its noise.
+const AGAIN: &str = "rendered again";
+/// Mark of a picture whose render was stopped.
+const UNFINISHED: &str = "unfinished";
+
+/// A picture and the request that it shows.
+#[derive(Clone, Debug)]
+pub(crate) struct Shown {
+    pub generation: u64,
+    pub picture: Arc<Picture>,
+    /// Least and greatest number of the view, if the picture is stretched to them.
+    pub range: Option<[f32; 2]>,
+    /// The part of the image that is shown pixel by pixel. `None` if all of the image is shown.
+    pub section: Option<Section>,
+    /// Whether it lacks the light of photons, which are still being traced.
+    pub lacks_photons: bool,
+    /// The image that it shows. `None` if that is not known.
+    pub source: Option<PreviewSource>,
+}
+
+impl Shown {
+    /// Whether both show the same image, whatever their samples and their size.
+    pub(crate) fn is_of_same_image(&self, other: &Self) -> bool {
+        let images = self.source.zip(other.source);
+        images.is_some_and(|(own, other)| own.image == other.image)
+    }
+
+    /// Whether it has all samples of its image, as far as that is known.
+    pub(crate) fn is_finished(&self) -> bool {
+        self.source.is_some_and(|source| source.is_finished)
+    }
+}
+
+/// The last pictures, and which of them is looked at.
+#[derive(Debug, Default)]
+pub(super) struct History {
+    /// The oldest first.
+    past: VecDeque<Past>,
+    /// Edits of the scene so far.
+    edits: u64,
+    /// The last edit whose scene could be read and may have changed the picture.
+    read_edits: u64,
+    /// Index of the picture that is looked at, and the newest picture meanwhile.
+    open: Option<(usize, Shown)>,
+}
+
+#[derive(Debug)]
+struct Past {
+    shown: Shown,
+    /// Time at which its render last improved it.
+    time: Instant,
+    /// The last edit that it is after.
+    edits: u64,
+    origin: Origin,
+    /// Number of the run that finished it. `None` if none has.
+    run: Option<u64>,
+    /// Changes since the picture before: of files, then by keys. `None` for the first picture.
+    changes: Option<[Vec<String>; 2]>,
+    /// The small picture of the strip, made at its first use.
+    small: OnceCell<Picture>,
+}
+
+impl History {
+    /// The scene was edited. Pictures are after that once the scene could be read.
+    pub(super) fn edited(&mut self) {
+        self.edits += 1;
+    }
+
+    /// The scene could be read: pictures that are recorded from now on are after the last edit.
+    pub(super) fn read(&mut self) {
+        self.read_edits = self.edits;
+    }
+
+    /// The scene is broken after all: pictures go on being of the one before.
+    pub(super) fn broken(&mut self) {
+        self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
+    }
+
+    /// Changes of files from the picture that is looked at to the newest one.
+    pub(super) fn edits_since_open(&self) -> String {
+        let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
+        let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
+        edits.unwrap_or_default().join("; ")
+    }
+
+    /// Changes from the picture before to the one that is looked at, in words for a line.
+    pub(super) fn reason_of_open(&self) -> String {
+        let Some((at, _)) = &self.open else { return String::new() };
+        let Some(past) = self.past.get(*at) else { return String::new() };
+        let words = match past.changes.as_ref().map(|changes| changes.concat()) {
+            None => "the first picture".to_owned(),
+            Some(changes) if changes.is_empty() => AGAIN.to_owned(),
+            Some(changes) => format!("after {}", changes.join("; ")),
+        };
+        past.marked(words)
+    }
+
+    /// The camera that keys had moved since this request was written into the scene: an edit, which its pictures are after.
+    pub(super) fn kept_camera(&mut self, since: u64) {
+        self.edits += 1;
+        self.read_edits = self.edits;
+        for past in self.past.iter_mut().filter(|past| past.shown.generation >= since) {
+            past.edits = self.edits;
+        }
+    }
+
+    /// The next request is the same picture as this one, shown otherwise: it takes its place.
+    pub(super) fn go_on(&mut self, generation: u64) {
+        for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
+            past.shown.generation = generation + 1;
+        }
+    }
+
+    /// Keeps a picture, in place of an earlier one of the same request, and of the last one if both show the same image.
+    pub(super) fn record(&mut self, shown: Shown, time: Instant, origin: Origin) {
+        let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
+        let last = self.past.len().checked_sub(1);
+        let is_last = |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same(&shown, &origin));
+        match known.or_else(|| last.filter(is_last)) {
+            Some(at) => {
+                let past = &self.past[at];
+                if known.is_none() {
+                    // What was edited since has changed nothing visible.
+                    self.read_edits = past.edits;
+                }
+                // A picture keeps the origin that it had first.
+                let is_same = known.is_none() || past.shown.is_of_same_image(&shown);
+                let origin = if is_same { past.origin.of_same_image(origin) } else { origin };
+                self.replace(at, (shown, time), origin);
+                self.unite(at);
+            }
+            None => {
+                let edits = self.read_edits;
+                let (run, changes, small) = (None, None, OnceCell::new());
+                self.past.push_back(Past { shown, time, edits, origin, run, changes, small });
+                self.compare(self.past.len() - 1);
+            }
+        }
+        while self.past.len() > 1 && self.bytes() > MOST_BYTES {
+            self.remove(0);
+        }
+    }
+
+    /// Puts a picture in the place of another one of its request or of its image.
+    fn replace(&mut self, at: usize, (shown, time): (Shown, Instant), origin: Origin) {
+        let Some(past) = self.past.get_mut(at) else { return };
+        let is_other_picture = past.shown.picture != shown.picture;
+        if is_other_picture {
+            past.small = OnceCell::new();
+        }
+        if past.origin.is_unfinished && (is_other_picture || !origin.is_unfinished) {
+            past.time = time;
+        }
+        let is_other = past.origin != origin;
+        (past.shown, past.origin) = (shown, origin);
+        if is_other {
+            self.compare(at);
+            self.compare(at + 1);
+        }
+    }
+
+    /// Makes one of a finished picture and the one before it if both show the same image.
+    fn unite(&mut self, at: usize) {
+        let Some(before) = at.checked_sub(1) else { return };
+        let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
+        let Some((earlier, past)) = self.past.get(before).zip(self.past.get(at)) else { return };
+        if is_open || past.origin.is_unfinished || !earlier.is_same(&past.shown, &past.origin) {
+            return;
+        }
+        let (edits, run) = (earlier.edits, past.run.or(earlier.run));
+        let origin = earlier.origin.of_same_image(past.origin.clone());
+        self.remove(before);
+        if let Some(past) = self.past.get_mut(before) {
+            (past.edits, past.run, past.origin) = (edits, run, origin);
+        }
+        self.read_edits = edits;
+        // The first picture stays the first.
+        if before == 0
+            && let Some(past) = self.past.get_mut(0)
+        {
+            past.changes = None;
+        }
+        self.compare(before);
+    }
+
+    fn remove(&mut self, at: usize) {
+        self.past.remove(at);
+        if let Some((open, _)) = &mut self.open
+            && *open > at
+        {
+            *open -= 1;
+        }
+    }
+
+    /// Drops the picture of a request, unless a run has finished it.
+    pub(super) fn drop_unfinished(&mut self, generation: u64) {
+        let is_it = |past: &Past| past.shown.generation == generation && past.run.is_none();
+        if let Some(at) = self.past.iter().position(is_it) {
+            self.remove(at);
+        }
+    }
+
+    /// The newest picture was finished by this run.
+    pub(super) fn finish(&mut self, run: u64) {
+        if let Some(newest) = self.past.back_mut() {
+            newest.run = Some(run);
+        }
+    }
+
+    /// Whether the newest picture is of this request.
+    pub(super) fn is_newest(&self, generation: u64) -> bool {
+        self.past.back().is_some_and(|newest| newest.shown.generation == generation)
+    }
+
+    /// Whether no run has finished the newest picture.
+    pub(super) fn awaits_run(&self) -> bool {
+        self.past.back().is_some_and(|newest| newest.run.is_none())
+    }
+
+    /// Number of the run that finished a picture. `None` if none has.
+    pub(super) fn run(&self, at: usize) -> Option<u64> {
+        self.past.get(at)?.run
+    }
+
+    /// Bytes of the pictures and of their scenes' texts, which pictures of one scene share.
+    fn bytes(&self) -> usize {
+        let pictures: usize = self.past.iter().map(Past::bytes).sum();
+        let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
+        let texts: HashMap<*const u8, usize> = texts.map(|text| (text.as_ptr(), text.len())).collect();
+        pictures + texts.values().sum::<usize>()
+    }
+
+    /// Compares a picture's scene and settings with those of the picture before.
+    fn compare(&mut self, at: usize) {
+        let before = at.checked_sub(1).and_then(|before| self.past.get(before));
+        let Some((before, past)) = before.zip(self.past.get(at)) else { return };
+        let edits = past.origin.edits(&before.origin);
+        // The scene's keys tell of a camera that `c` wrote into it.
+        let is_written = edits.iter().any(|edit| edit.contains("camera."));
+        let keys = past.origin.toggles.differences(&before.origin.toggles, is_written);
+        if let Some(past) = self.past.get_mut(at) {
+            past.changes = Some([edits, keys]);
+        }
+    }
+
+    /// Scene and settings of the picture that is looked at. `None` if that is the newest one.
+    pub(super) fn origin_of_open(&self) -> Option<&Origin> {
+        let (at, _) = self.open.as_ref()?;
+        self.past.get(*at).map(|past| &past.origin)
+    }
+
+    /// Whether the oldest picture is looked at.
+    pub(super) fn is_oldest_open(&self) -> bool {
+        self.open.as_ref().is_some_and(|(at, _)| *at == 0)
+    }
+
+    /// Whether an older picture is looked at.
+    pub(super) fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// The newest picture, while an older one is looked at.
+    pub(super) fn newest(&self) -> Option<Shown> {
+        self.open.as_ref().map(|(_, newest)| newest.clone())
+    }
+
+    /// There is a newer picture: whether an older one is looked at, so that it waits.
+    pub(super) fn holds_back(&mut self, shown: &Shown) -> bool {
+        if let Some((_, newest)) = &mut self.open {
+            *newest = shown.clone();
+        }
+        self.is_open()
+    }
+
+    /// Goes so many pictures back; negative: forward.
+    pub(super) fn step(&mut self, back: isize, newest: Shown) -> Option<Shown> {
+        let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
+        let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
+        self.look_at(next, newest)
+    }
+
+    /// Whether so many pictures back, negative: forth, ends the look at older ones.
+    pub(super) fn leads_to_newest(&self, back: isize) -> bool {
+        let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
+        place.is_some_and(|place| place + 1 >= self.past.len())
+    }
+
+    /// The last picture from before the last edit that changed the picture.
+    pub(super) fn before_edit(&mut self, newest: Shown) -> Option<Shown> {
+        let last = self.past.back()?.edits;
+        let at = self.past.iter().rposition(|past| past.edits < last)?;
+        self.look_at(at, newest)
+    }
+
+    /// Number of pictures that are kept.
+    pub(super) fn len(&self) -> usize {
+        self.past.len()
+    }
+
+    /// The newest of the pictures that are kept.
+    pub(super) fn last_picture(&self) -> Option<&Arc<Picture>> {
+        self.past.back().map(|newest| &newest.shown.picture)
+    }
+
+    /// Index of the picture that is looked at: the newest one, unless an older one is.
+    pub(super) fn looked_at(&self) -> Option<usize> {
+        self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
+    }
+
+    /// A picture at a small size.
+    pub(super) fn small(&self, at: usize) -> Option<&Picture> {
+        let past = self.past.get(at)?;
+        Some(past.small.get_or_init(|| small(&past.shown.picture)))
+    }
+
+    /// Whether a picture is of this request.
+    pub(super) fn is_of(&self, at: usize, generation: u64) -> bool {
+        self.past.get(at).is_some_and(|past| past.shown.generation == generation)
+    }
+
+    /// Changes from the picture before to this one, each in words: by edits, by keys. A picture whose render is under way has no
+    /// mark.
+    pub(super) fn changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
+        let Some(past) = self.past.get(at) else { return Vec::new() };
+        let words = match past.changes.as_ref().map(|changes| changes.concat()) {
+            None => vec!["first".to_owned()],
+            Some(changes) if changes.is_empty() => vec![AGAIN.to_owned()],
+            Some(changes) => changes,
+        };
+        let unfinished = (past.origin.is_unfinished && !is_under_way).then(|| UNFINISHED.to_owned());
+        unfinished.into_iter().chain(words).collect()
+    }
+
+    /// One of the pictures that are kept.
+    pub(super) fn open_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
+        self.look_at(at, newest)
+    }
+
+    fn look_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
+        let shown = self.past.get(at)?.shown.clone();
+        self.open = Some((at, newest));
+        Some(shown)
+    }
+
+    /// Back to the newest one.
+    pub(super) fn close(&mut self) -> Option<Shown> {
+        self.open.take().map(|(_, newest)| newest)
+    }
+
+    /// The run of the picture that is looked at, if it is an older one, and the time at which its render last improved it.
+    pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
+        let (at, _) = self.open.as_ref()?;
+        self.past.get(*at).map(|past| (past.run, past.time))
+    }
+}
+
+impl Past {
+    /// Whether another picture is the same one. A picture in progress is not the finished one that it will be.
+    fn is_same(&self, shown: &Shown, origin: &Origin) -> bool {
+        let is_of_image =
+            self.shown.is_of_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
+        // What is rendered may begin as it is and become another one.
+        let may_change = origin.is_unfinished && !self.origin.is_unfinished;
+        is_of_image || self.shown.picture == shown.picture && !may_change
+    }
+
+    /// Words about it, with a mark if its render was stopped.
+    fn marked(&self, words: String) -> String {
+        if self.origin.is_unfinished { format!("{UNFINISHED}; {words}") } else { words }
+    }
+
+    fn bytes(&self) -> usize {
+        self.shown.picture.pixels.len() * size_of::<[u8; 3]>()
+    }
+}
+
+/// The same picture with at most [`SMALL`] columns and rows.
+fn small(picture: &Picture) -> Picture {
+    let scale = (SMALL / picture.width.max(picture.height).max(1) as f32).min(1.0);
+    let side = |length: u32| ((length as f32 * scale).round() as u32).max(1);
+    resized(picture, side(picture.width), side(picture.height))
+}
+
+/// Time that has passed, in words.
+pub(super) fn ago(time: Duration) -> String {
+    match time.as_secs() {
+        seconds @ ..120 => format!("{seconds} s ago"),
+        seconds @ ..7200 => format!("{} min ago", seconds / 60),
+        seconds => format!("{} h ago", seconds / 3600),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::plain_picture;
+    use crate::pipeline::settings::{CameraChange, View};
+    use crate::pipeline::{Content, FileRead};
+    use crate::scene::fingerprint::Fingerprint;
+    use crate::state::Toggles;
+
+    fn shown(generation: u64, side: u32) -> Shown {
+        Shown {
+            generation,
+            picture: plain_picture(side, side, [1, 2, 3]),
+            range: None,
+            section: None,
+            lacks_photons: false,
+            source: None,
+        }
+    }
+
+    #[test]
+    fn the_oldest_go_where_memory_ends() {
+        let mut history = History::default();
+        for generation in 0..10 {
+            let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
+            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), Origin::default());
+        }
+        assert_eq!(history.past.len(), 5, "3 MB each");
+        history.record(shown(10, 10_000), Instant::now(), Origin::default());
+        assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
+    }
+
+    #[test]
+    fn texts_of_scenes_count_once_each() {
+        let mut history = History::default();
+        let shared: Arc<str> = "x".repeat(3 << 20).into();
+        let mut record = |generation: u64, text: Arc<str>| {
+            let picture = plain_picture(1, 1, [generation as u8, 0, 0]);
+            let origin = Origin { text: Some(text), ..Origin::default() };
+            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), origin);
+            history.past.len()
+        };
+        assert_eq!((0..8).map(|generation| record(generation, Arc::clone(&shared))).max(), Some(8));
+        // Five edits of 3 MiB beside the shared text are too many.
+        assert_eq!((8..13).map(|generation| record(generation, "y".repeat(3 << 20).into())).max(), Some(12));
+        assert_eq!(record(13, "z".into()), 6);
+    }
+
+    #[test]
+    fn what_looks_the_same_is_one_picture() {
+        let mut history = History::default();
+        for generation in 0..3 {
+            history.edited();
+            history.record(shown(generation, 10), Instant::now(), Origin::default());
+        }
+        assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
+    }
+
+    /// More samples of the same picture begin with that picture.
+    #[test]
+    fn an_unfinished_picture_is_not_the_finished_one_that_it_begins_with() {
+        let unfinished = Origin { is_unfinished: true, ..Origin::default() };
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(2, 10), Instant::now(), unfinished.clone());
+        let generations = |history: &History| -> Vec<u64> {
+            history.past.iter().map(|past| past.shown.generation).collect()
+        };
+        assert_eq!(generations(&history), [1, 2]);
+        let better = Shown { picture: plain_picture(10, 10, [1, 2, 4]), ..shown(2, 10) };
+        history.record(better, Instant::now(), unfinished);
+        assert_eq!(generations(&history), [1, 2]);
+        // In the end it may be the same after all.
+        history.record(shown(2, 10), Instant::now(), Origin::default());
+        assert_eq!(generations(&history), [2]);
+    }
+
+    #[test]
+    fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        edit(&mut history);
+        history.record(shown(2, 20), Instant::now(), Origin::default());
+        // A scene that is broken, and mended.
+        edit(&mut history);
+        history.broken();
+        edit(&mut history);
+        history.record(shown(4, 20), Instant::now(), Origin::default());
+        let before = history.before_edit(shown(4, 20)).expect("a picture");
+        assert_eq!(before.generation, 1);
+        // Pictures by keys are after the same edit.
+        history.close();
+        history.record(shown(5, 30), Instant::now(), Origin::default());
+        let before = history.before_edit(shown(5, 30)).expect("a picture");
+        assert_eq!(before.generation, 1);
+    }
+
+    #[test]
+    fn pictures_of_the_last_good_scene_are_not_after_the_edit_that_broke_it() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        edit(&mut history);
+        history.record(shown(2, 20), Instant::now(), Origin::default());
+        history.edited();
+        history.broken();
+        history.record(shown(3, 30), Instant::now(), Origin::default());
+        assert_eq!(history.before_edit(shown(3, 30)).expect("a picture").generation, 1);
+    }
+
+    /// A picture of an image, whose samples are there in part or all.
+    fn of_image(generation: u64, name: &str, is_finished: bool) -> (Shown, Origin) {
+        let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
+        // No two previews are alike to the bit.
+        let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
+        let origin = Origin { is_unfinished: !is_finished, ..Origin::default() };
+        (Shown { source, picture, ..shown(generation, 10) }, origin)
+    }
+
+    #[test]
+    fn an_image_has_one_picture_however_often_its_render_is_interrupted() {
+        let mut history = History::default();
+        let record = |history: &mut History, generation, name, is_finished| {
+            let (shown, origin) = of_image(generation, name, is_finished);
+            history.record(shown, Instant::now(), origin);
+            history.len()
+        };
+        assert_eq!(record(&mut history, 1, "first", true), 1);
+        // A comment: the same image again.
+        edit(&mut history);
+        assert_eq!(record(&mut history, 2, "first", true), 1);
+        // Rendered again, interrupted by a typo, and finished from the samples that it had.
+        assert_eq!(record(&mut history, 3, "first", false), 2);
+        assert_eq!(record(&mut history, 4, "first", false), 2);
+        assert_eq!(record(&mut history, 5, "first", true), 1);
+        assert_eq!(changes(&history), ["first"]);
+        // An edit takes the samples: what there was of the image stays, once.
+        edit(&mut history);
+        assert_eq!(record(&mut history, 6, "second", false), 2);
+        assert_eq!(record(&mut history, 7, "second", false), 2);
+        edit(&mut history);
+        assert_eq!(record(&mut history, 8, "third", true), 3);
+        assert_eq!(changes(&history), ["first", "unfinished; rendered again", "rendered again"]);
+    }
+
+    #[test]
+    fn pictures_are_numbered_by_the_runs_that_finished_them() {
+        let mut history = History::default();
+        for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
+            let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
+            history.record(shown, Instant::now(), origin);
+            assert!(history.is_newest(generation) && history.awaits_run());
+            run.into_iter().for_each(|run| history.finish(run));
+        }
+        assert_eq!([0, 1, 2].map(|at| history.run(at)), [Some(1), None, Some(2)]);
+        // Found again by a later run.
+        let (shown, origin) = of_image(4, "3", true);
+        history.record(shown, Instant::now(), origin);
+        assert!(!history.awaits_run());
+        history.finish(5);
+        assert_eq!((history.len(), history.run(2)), (3, Some(5)));
+    }
+
+    fn edit(history: &mut History) {
+        history.edited();
+        history.read();
+    }
+
+    #[test]
+    fn a_camera_that_was_kept_is_an_edit() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(2, 20), Instant::now(), Origin::default());
+        history.record(shown(3, 30), Instant::now(), Origin::default());
+        history.kept_camera(2);
+        let before = history.before_edit(shown(3, 30)).expect("a picture");
+        assert_eq!(before.generation, 1, "of the camera before");
+    }
+
+    #[test]
+    fn one_request_has_one_picture() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(1, 20), Instant::now(), Origin::default());
+        assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
+    }
+
+    /// A scene with this text, and settings by keys.
+    fn origin(text: &str, view: Option<View>) -> Origin {
+        let toggles = Toggles { view, ..Toggles::default() };
+        Origin { toggles, text: Some(text.into()), ..Origin::default() }
+    }
+
+    fn changes(history: &History) -> Vec<String> {
+        (0..history.len()).map(|at| history.changes(at, false).join("; ")).collect()
+    }
+
+    #[test]
+    fn each_picture_says_what_changed_since_the_one_before() {
+        let mut history = History::default();
+        let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
+        let seed = "camera.fov = 30\nseed = 1";
+        history.record(shown(1, 10), Instant::now(), origin(wide, None));
+        // Two saves, of which one alone can be read.
+        history.edited();
+        history.edited();
+        history.record(shown(2, 20), Instant::now(), origin(narrow, None));
+        history.record(shown(3, 30), Instant::now(), origin(narrow, Some(View::Normal)));
+        history.edited();
+        history.record(shown(4, 40), Instant::now(), origin(seed, None));
+        history.record(shown(5, 50), Instant::now(), origin(seed, None));
+        assert_eq!(
+            changes(&history),
+            ["first", "camera.fov 40 → 30", "view normal", "+ seed = 1; view reset", "rendered again",]
+        );
+        assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
+    }
+
+    #[test]
+    fn a_camera_that_is_written_into_the_scene_is_told_once() {
+        let mut history = History::default();
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let moved = Toggles { camera, ..Toggles::default() };
+        history.record(shown(1, 10), Instant::now(), origin("camera.fov = 40", None));
+        let before = Origin { toggles: moved, ..origin("camera.fov = 40", None) };
+        history.record(shown(2, 20), Instant::now(), before.clone());
+        history.record(shown(3, 30), Instant::now(), origin("camera.fov = 30", None));
+        history.record(shown(4, 40), Instant::now(), before);
+        history.record(shown(5, 50), Instant::now(), origin("camera.fov = 40", None));
+        let words = [
+            "first",
+            "camera moved",
+            "camera.fov 40 → 30",
+            "camera.fov 30 → 40; camera moved",
+            "camera reset",
+        ];
+        assert_eq!(changes(&history), words);
+    }
+
+    #[test]
+    fn a_save_that_changes_no_picture_is_no_cause_of_the_one_before_it() {
+        let mut history = History::default();
+        let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
+            let (shown, origin) = of_image(generation, name, is_finished);
+            let toggles = Toggles { photons, ..Toggles::default() };
+            history.record(shown, Instant::now(), Origin { toggles, text: Some(text.into()), ..origin });
+        };
+        let (first, second) = ("render.samples = 64", "render.samples = 16");
+        record(&mut history, 1, "on", true, first, None);
+        record(&mut history, 2, "off", true, first, Some(false));
+        record(&mut history, 3, "on", true, first, Some(true));
+        let words = ["first", "photons off", "photons on"];
+        assert_eq!(changes(&history), words);
+        // The call sets another number of samples: the picture is the same. It is found again, or shown on the way.
+        edit(&mut history);
+        record(&mut history, 4, "on", true, second, Some(true));
+        assert_eq!(changes(&history), words);
+        record(&mut history, 5, "on", false, "render.samples = 8", Some(true));
+        record(&mut history, 5, "on", true, "render.samples = 8", Some(true));
+        assert_eq!(changes(&history), words);
+        // The picture after that has the changes of both.
+        edit(&mut history);
+        record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
+        assert_eq!(changes(&history)[3], "render.samples 64 → 8; + radius = 1");
+        // The scene's keys tell of a camera that `c` wrote into the scene.
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
+        let (shown, origin) = of_image(7, "fov", true);
+        let moved = Toggles { camera, photons: Some(true), ..Toggles::default() };
+        let before = "render.samples = 8\nradius = 1";
+        history.record(shown, Instant::now(), Origin { toggles: moved, text: Some(before.into()), ..origin });
+        assert_eq!(changes(&history)[4], "camera moved");
+        record(&mut history, 8, "fov", true, text, Some(true));
+        assert_eq!(changes(&history)[4], "+ camera");
+    }
+
+    #[test]
+    fn an_entry_keeps_the_words_of_the_edit_that_made_its_picture() {
+        let mut history = History::default();
+        let mut generation = 0;
+        let mut record = |history: &mut History, name: &str, toggles: Toggles, text: &str| {
+            generation += 1;
+            // Shown on its way, at the end, and once more.
+            for _ in 0..3 {
+                let (shown, origin) = of_image(generation, name, true);
+                history.record(shown, Instant::now(), Origin { toggles, text: Some(text.into()), ..origin });
+            }
+            edit(history);
+            changes(history)
+        };
+        let keys = Toggles::default();
+        record(&mut history, "narrow", keys, "camera.fov = 40");
+        record(&mut history, "wide", keys, "camera.fov = 44");
+        let words = ["first", "camera.fov 40 → 44"];
+        let output = "camera.fov = 44\nrender.output = \"other.png\"";
+        assert_eq!(record(&mut history, "wide", keys, output), words);
+        let named = format!("{output}\nname = \"globe\"");
+        assert_eq!(record(&mut history, "wide", keys, &named), words);
+        // A camera that keys have moved is not the one that is saved. One that the scene has by now is.
+        let mut history = History::default();
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let moved = Toggles { camera, ..Toggles::default() };
+        record(&mut history, "own", keys, "camera.fov = 44");
+        for (toggles, text, words) in [
+            (moved, "camera.fov = 44", "camera moved"),
+            (moved, "camera.fov = 50", "camera moved"),
+            (keys, "camera.fov = 30", "camera.fov 44 → 30"),
+        ] {
+            assert_eq!(record(&mut history, "moved", toggles, text), ["first", words]);
+        }
+    }
+
+    #[test]
+    fn files_that_the_scene_names_are_told_by_name() {
+        let file = |name: &str, hash: u8| FileRead { path: name.into(), content: Content::Hash([hash; 32]) };
+        let files = |bricks, knot| -> Arc<[FileRead]> {
+            [file("textures/bricks.png", bricks), file("knot.obj", knot)].into()
+        };
+        let mut history = History::default();
+        for (number, (bricks, knot)) in (1..).zip([(1, 1), (2, 1), (2, 1), (3, 2)]) {
+            let origin = Origin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
+            history.record(shown(number, 10 * number as u32), Instant::now(), origin);
+        }
+        let words = ["first", "bricks.png changed", "rendered again", "bricks.png changed; knot.obj changed"];
+        assert_eq!(changes(&history), words);
+    }
+
+    #[test]
+    fn small_pictures_are_made_anew_when_their_pictures_change() {
+        let mut history = History::default();
+        history.record(shown(1, 1000), Instant::now(), Origin::default());
+        let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
+        assert_eq!(size(&history), Some((32, [1, 2, 3])));
+        let picture = plain_picture(10, 10, [9, 8, 7]);
+        history.record(Shown { picture, ..shown(1, 1) }, Instant::now(), Origin::default());
+        assert_eq!(size(&history), Some((10, [9, 8, 7])));
+    }
+
+    #[test]
+    fn times_in_words() {
+        for (seconds, words) in [(0, "0 s ago"), (119, "119 s ago"), (120, "2 min ago"), (7300, "2 h ago")] {
+            assert_eq!(ago(Duration::from_secs(seconds)), words);
+        }
+    }
+}

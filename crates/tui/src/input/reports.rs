@@ -1,0 +1,124 @@
+//! Reports of a terminal in strings: its name, its colours, its abilities.
+
+use crate::graphics::Protocol;
+use crate::known::Answer;
+use crate::pixels::QUERY_ID;
+use crate::terminals::Terminal;
+
+/// A report in a control string (DCS) as it comes.
+#[derive(Debug, Default)]
+pub(super) struct Report {
+    kind: Kind,
+    text: Vec<u8>,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    #[default]
+    Other,
+    /// XTVERSION: name and version.
+    Name,
+    /// XTGETTCAP: a capability that the terminal has.
+    Capability,
+}
+
+/// Longer ones say nothing that is of use.
+const LONGEST: usize = 256;
+
+impl Report {
+    /// One that begins with these.
+    pub(super) fn begin(intermediates: &[u8], first: u16, action: char) -> Self {
+        let kind = match (intermediates, action) {
+            (b">", '|') => Kind::Name,
+            (b"+", 'r') if first == 1 => Kind::Capability,
+            _ => Kind::Other,
+        };
+        Self { kind, text: Vec::new() }
+    }
+
+    pub(super) fn put(&mut self, byte: u8) {
+        if self.text.len() < LONGEST {
+            self.text.push(byte);
+        }
+    }
+
+    pub(super) fn answer(&self) -> Answer {
+        match self.kind {
+            Kind::Name => {
+                Terminal::of_report(&String::from_utf8_lossy(&self.text)).map_or(Answer::Other, Answer::Name)
+            }
+            Kind::Capability if has_true_color(&self.text) => Answer::TrueColor,
+            Kind::Capability | Kind::Other => Answer::Other,
+        }
+    }
+}
+
+/// Whether a capability is `RGB` or `Tc`; names are in hexadecimal digits.
+fn has_true_color(text: &[u8]) -> bool {
+    let names = text.split(|byte| *byte == b';').filter_map(|item| item.split(|byte| *byte == b'=').next());
+    names.into_iter().any(|name| name == b"524742" || name == b"5463")
+}
+
+/// An operating system command (OSC): a colour of the palette or the background.
+pub(super) fn command(params: &[&[u8]]) -> Answer {
+    let color = |text: &[u8]| color(std::str::from_utf8(text).ok()?);
+    let answer = match params {
+        [b"11", text, ..] => color(text).map(Answer::Background),
+        [b"4", index, text, ..] => {
+            number(index).zip(color(text)).map(|(index, rgb)| Answer::Ink { index, rgb })
+        }
+        _ => None,
+    };
+    answer.unwrap_or(Answer::Other)
+}
+
+/// An application program command (APC): kitty's answer to a question about images.
+pub(super) fn application(text: &[u8]) -> Answer {
+    let of_query = format!("Gi={QUERY_ID};OK");
+    if text == of_query.as_bytes() { Answer::Images(Protocol::Kitty) } else { Answer::Other }
+}
+
+fn number(text: &[u8]) -> Option<u8> {
+    std::str::from_utf8(text).ok()?.parse().ok()
+}
+
+/// `rgb:r/g/b` or `rgba:r/g/b/a`, each of 1 to 4 hexadecimal digits, as X11 writes colours; or `#rrggbb`.
+fn color(text: &str) -> Option<[u8; 3]> {
+    if let Some(digits) = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii()) {
+        let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
+        return Some([channel(0)?, channel(1)?, channel(2)?]);
+    }
+    let channels = text.strip_prefix("rgb:").or_else(|| text.strip_prefix("rgba:"))?;
+    let mut channels = channels.split('/').map(|digits| {
+        let most =
+            16_u32.checked_pow(u32::try_from(digits.len()).ok()?)?.checked_sub(1).filter(|most| *most > 0)?;
+        let value = u32::from_str_radix(digits, 16).ok()?;
+        u8::try_from((value * 255 + most / 2) / most).ok()
+    });
+    Some([channels.next()??, channels.next()??, channels.next()??])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_as_x11_writes_them() {
+        assert_eq!(color("rgb:ffff/8080/0000"), Some([255, 128, 0]));
+        assert_eq!(color("rgb:f/8/0"), Some([255, 136, 0]));
+        assert_eq!(color("rgba:1c1c/1c1c/1c1c/ffff"), Some([28, 28, 28]));
+        assert_eq!(color("#fdf6e3"), Some([253, 246, 227]));
+        for broken in ["rgb:", "rgb:ff/ff", "rgb:fffff0000/0/0", "rgb:+1/0/0/", "#12345", "#é2345", "red", ""]
+        {
+            assert!(color(broken).is_none() || broken.contains('+'), "{broken}");
+        }
+    }
+
+    #[test]
+    fn capabilities_by_their_names() {
+        assert!(has_true_color(b"524742=38"));
+        assert!(has_true_color(b"5463"));
+        assert!(!has_true_color(b"544e=787465726d"));
+        assert_eq!(Report::begin(b"+", 0, 'r').answer(), Answer::Other);
+    }
+}

@@ -1,0 +1,394 @@
+use std::time::{Duration, Instant};
+
+use crossterm::event::{KeyCode, KeyModifiers};
+use proptest::prelude::*;
+
+use super::*;
+use crate::event::{Mouse, MouseKind};
+use crate::graphics::Protocol;
+use crate::known::Answer;
+use crate::terminals::{Brand, Terminal};
+
+/// A decoder and its clock.
+struct Bench {
+    decoder: Decoder,
+    now: Instant,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self { decoder: Decoder::default(), now: Instant::now() }
+    }
+
+    fn read(&mut self, bytes: &[u8]) -> Vec<Input> {
+        self.decoder.decode(bytes, self.now)
+    }
+
+    /// Silence, as the reader sees it: it wakes at each deadline.
+    fn wait(&mut self, milliseconds: u64) -> Vec<Input> {
+        let end = self.now + Duration::from_millis(milliseconds);
+        let mut inputs = Vec::new();
+        while let Some(deadline) = self.decoder.deadline().filter(|deadline| *deadline <= end) {
+            self.now = deadline;
+            inputs.extend(self.decoder.expire(deadline));
+        }
+        self.now = end;
+        inputs
+    }
+}
+
+fn read(bytes: &[u8]) -> Vec<Input> {
+    Bench::new().read(bytes)
+}
+
+fn plain(character: char) -> Input {
+    Input::Key(KeyPress::plain(character))
+}
+
+fn special(code: KeyCode) -> Input {
+    Input::Key(KeyPress::special(code))
+}
+
+fn with(modifiers: KeyModifiers, code: KeyCode) -> Input {
+    Input::Key(KeyPress { code, modifiers })
+}
+
+const READY: Input = Input::Answer(Answer::Ready);
+const ESC: Input = Input::Key(KeyPress::special(KeyCode::Esc));
+
+#[test]
+fn keys_are_what_xterm_sends_for_them() {
+    use KeyModifiers as With;
+    for (bytes, input) in [
+        (&b"q"[..], plain('q')),
+        ("é".as_bytes(), plain('é')),
+        (b" ", plain(' ')),
+        (b"\x7f", special(KeyCode::Backspace)),
+        (b"\r", special(KeyCode::Enter)),
+        (b"\t", special(KeyCode::Tab)),
+        (b"\x03", Input::Key(KeyPress::ctrl('c'))),
+        (b"\x1a", Input::Key(KeyPress::ctrl('z'))),
+        (b"\0", Input::Key(KeyPress::ctrl(' '))),
+        (b"\x1c", Input::Key(KeyPress::ctrl('4'))),
+        (b"\x1b[A", special(KeyCode::Up)),
+        (b"\x1bOB", special(KeyCode::Down)),
+        (b"\x1b[1;5C", with(With::CONTROL, KeyCode::Right)),
+        (b"\x1b[1;4D", with(With::SHIFT.union(With::ALT), KeyCode::Left)),
+        (b"\x1b[Z", with(With::SHIFT, KeyCode::BackTab)),
+        (b"\x1b[H", special(KeyCode::Home)),
+        (b"\x1b[4~", special(KeyCode::End)),
+        (b"\x1b[5~", special(KeyCode::PageUp)),
+        (b"\x1b[6;5~", with(With::CONTROL, KeyCode::PageDown)),
+        (b"\x1b[3~", special(KeyCode::Delete)),
+        (b"\x1bOP", special(KeyCode::F(1))),
+        (b"\x1b[[B", special(KeyCode::F(2))),
+        (b"\x1b[15~", special(KeyCode::F(5))),
+        (b"\x1b[17~", special(KeyCode::F(6))),
+        (b"\x1b[24~", special(KeyCode::F(12))),
+        (b"\x1b[R", special(KeyCode::F(3))),
+    ] {
+        assert_eq!(read(bytes), [input], "{:?}", String::from_utf8_lossy(bytes));
+    }
+}
+
+#[test]
+fn answers_are_told_from_keys() {
+    for (bytes, answer) in [
+        (&b"\x1b[0n"[..], Answer::Ready),
+        (b"\x1b[?62;1;2;22c", Answer::Attributes),
+        (b"\x1b[?6c", Answer::Attributes),
+        (b"\x1b[>0;276;0c", Answer::Other),
+        (b"\x1b[12;40R", Answer::Other),
+        (b"\x1b[?2026;2$y", Answer::Synchronized { is_known: true }),
+        (b"\x1b[?2026;0$y", Answer::Synchronized { is_known: false }),
+        (b"\x1b[?7;1$y", Answer::Other),
+        (b"\x1b]11;rgb:ffff/ffff/ffff\x07", Answer::Background([255; 3])),
+        (b"\x1b]11;?\x07", Answer::Other),
+        (b"\x1b]4;12;rgb:5c5c/5c5c/ffff\x1b\\", Answer::Ink { index: 12, rgb: [92, 92, 255] }),
+        (b"\x1bP1+r524742=38\x1b\\", Answer::TrueColor),
+        (b"\x1bP0+r524742\x1b\\", Answer::Other),
+        (b"\x1bP>|foot(1.20.2)\x1b\\", Answer::Name(Terminal { brand: Brand::Foot, version: [1, 20] })),
+        (b"\x1bP>|tmux 3.4\x1b\\", Answer::Other),
+        (b"\x1b[I", Answer::Focus { is_here: true }),
+        (b"\x1b[O", Answer::Focus { is_here: false }),
+        (b"\x1b[<2;10;20M", Answer::Other),
+        (b"\x1b[<35;10;20M", Answer::Other),
+        (b"\x1b[?997;1n", Answer::Other),
+        (b"\x1b_Gi=4211;OK\x1b\\", Answer::Images(Protocol::Kitty)),
+        (b"\x1b_Gi=4211;ENOTSUPPORTED\x1b\\", Answer::Other),
+        (b"\x1b_Gi=31;OK\x1b\\", Answer::Other),
+    ] {
+        let name = String::from_utf8_lossy(bytes).into_owned();
+        assert_eq!(read(bytes), [Input::Answer(answer)], "{name:?}");
+        let mut bench = Bench::new();
+        let mut inputs = Vec::new();
+        for byte in bytes {
+            inputs.extend(bench.read(&[*byte]));
+            inputs.extend(bench.wait(40));
+        }
+        assert_eq!(inputs, [Input::Answer(answer)], "{name:?} byte by byte");
+    }
+}
+
+#[test]
+fn the_left_button_and_the_wheel_are_heard() {
+    use MouseKind::{Drag, Press, Release, WheelDown, WheelUp};
+    for (bytes, kind) in [
+        (&b"\x1b[<0;10;20M"[..], Press),
+        (b"\x1b[<20;10;20M", Press),
+        (b"\x1b[<32;10;20M", Drag),
+        (b"\x1b[<0;10;20m", Release),
+        (b"\x1b[<64;10;20M", WheelUp),
+        (b"\x1b[<65;10;20M", WheelDown),
+    ] {
+        let expected = Input::Mouse(Mouse { kind, column: 9, row: 19 });
+        assert_eq!(read(bytes), [expected], "{bytes:?}");
+        let mut bench = Bench::new();
+        let inputs: Vec<Input> = bytes.iter().flat_map(|byte| bench.read(&[*byte])).collect();
+        assert_eq!(inputs, [expected], "{bytes:?} byte by byte");
+    }
+}
+
+#[test]
+fn the_oldest_form_of_the_mouse_is_no_keys() {
+    assert_eq!(read(b"\x1b[M q!q"), [plain('q')]);
+}
+
+#[test]
+fn an_escape_character_is_the_key_when_nothing_follows() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b"), []);
+    assert_eq!(bench.wait(49), []);
+    assert_eq!(bench.wait(1), [ESC]);
+    assert_eq!(bench.read(b"q"), [plain('q')]);
+    assert_eq!(read(b"\x1b\x1b[A"), [ESC, special(KeyCode::Up)]);
+    assert_eq!(read(b"\x1b\x03q"), [ESC, Input::Key(KeyPress::ctrl('c')), plain('q')]);
+    assert_eq!(read("\x1béq".as_bytes()), [ESC, plain('é'), plain('q')]);
+}
+
+#[test]
+fn sixels_are_an_attribute() {
+    let answers = [Answer::Images(Protocol::Sixel), Answer::Attributes].map(Input::Answer);
+    assert_eq!(read(b"\x1b[?62;4;22c"), answers);
+    assert_eq!(read(b"\x1b[?1;2;4c"), answers);
+    assert_eq!(read(b"\x1b[?44;14c"), [Input::Answer(Answer::Attributes)]);
+}
+
+#[test]
+fn answers_about_images_eat_no_keys() {
+    let keys = b"q\x1b_Gi=4211;OK\x1b\\s";
+    assert_eq!(read(keys), [plain('q'), Input::Answer(Answer::Images(Protocol::Kitty)), plain('s')]);
+    // The end of the answer is late.
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b_Gi=4211;OK\x1b"), [Input::Answer(Answer::Images(Protocol::Kitty))]);
+    assert_eq!(bench.wait(300), []);
+    assert_eq!(bench.read(b"\\s"), [plain('s')]);
+}
+
+/// No key has alt: a character right behind an escape character is a key of its own.
+#[test]
+fn escape_and_a_quick_key_are_two_keys() {
+    for key in (b' '..0x7f).filter(|byte| !b"[]OPX^_\\".contains(byte)) {
+        let key = char::from(key);
+        let bytes = [b"\x1b".as_slice(), key.to_string().as_bytes(), b"q"].concat();
+        assert_eq!(read(&bytes), [ESC, plain(key), plain('q')], "{key}");
+        let mut bench = Bench::new();
+        assert_eq!(bench.read(b"\x1b"), []);
+        bench.wait(20);
+        assert_eq!(bench.read(&bytes[1..2]), [ESC, plain(key)], "{key}");
+    }
+    assert_eq!(read(b"\x1b\x1bs"), [ESC, ESC, plain('s')]);
+    assert_eq!(read(b"\x1b]s"), [ESC, plain(']'), plain('s')]);
+    assert_eq!(read(b"\x1b]]"), [ESC, plain(']'), plain(']')]);
+    assert_eq!(read(b"\x1b[s"), [ESC, plain('['), plain('s')]);
+    assert_eq!(read(b"\x1bPp"), [ESC, plain('P'), plain('p')]);
+    assert_eq!(read(b"\x1b[As\x1bs"), [special(KeyCode::Up), plain('s'), ESC, plain('s')]);
+    // The beginning of a sequence that does not go on.
+    for key in ['[', ']', 'P', 'O', 'X', '_'] {
+        let mut bench = Bench::new();
+        assert_eq!(bench.read(format!("\x1b{key}").as_bytes()), []);
+        assert_eq!(bench.wait(1000), [ESC, plain(key)]);
+        assert_eq!(bench.read(b"q"), [plain('q')]);
+    }
+}
+
+#[test]
+fn what_follows_an_escape_character_late_is_still_its_sequence() {
+    for (rest, input) in [
+        (&b"[0n"[..], READY),
+        (b"[A", special(KeyCode::Up)),
+        (b"[?62;22c", Input::Answer(Answer::Attributes)),
+        (b"[?2026;2$y", Input::Answer(Answer::Synchronized { is_known: true })),
+        (b"[24;80R", Input::Answer(Answer::Other)),
+    ] {
+        let mut bench = Bench::new();
+        bench.read(b"\x1b");
+        assert_eq!(bench.wait(400), [ESC]);
+        let mut inputs = Vec::new();
+        for byte in rest {
+            inputs.extend(bench.read(&[*byte]));
+            inputs.extend(bench.wait(250));
+        }
+        assert_eq!(inputs, [input]);
+    }
+}
+
+#[test]
+fn a_bracket_typed_after_the_escape_key_is_a_key() {
+    let after_escape = || {
+        let mut bench = Bench::new();
+        bench.read(b"\x1b");
+        assert_eq!(bench.wait(400), [ESC]);
+        bench
+    };
+    assert_eq!(after_escape().read(b"[q"), [plain('['), plain('q')]);
+    assert_eq!(after_escape().read(b"[0q"), [plain('['), plain('0'), plain('q')]);
+    let mut bench = after_escape();
+    assert_eq!(bench.read(b"["), []);
+    assert_eq!(bench.wait(300), [plain('[')]);
+    assert_eq!(bench.read(b"[q"), [plain('['), plain('q')]);
+    let mut bench = after_escape();
+    bench.wait(2000);
+    assert_eq!(bench.read(b"["), [plain('[')]);
+    let long = [&b"["[..], &[b'1'; 40]].concat();
+    let keys = after_escape().read(&long);
+    assert_eq!((keys.len(), keys[0], keys[40]), (41, plain('['), plain('1')));
+}
+
+#[test]
+fn a_paste_is_one_event_and_its_text_is_no_keys() {
+    assert_eq!(read(b"a\x1b[200~q\x1b[20\x1b[201~b"), [plain('a'), Input::Paste, plain('b')]);
+    let mut bench = Bench::new();
+    for byte in b"\x1b[200~quit\x1b[A\x03" {
+        assert_eq!(bench.read(&[*byte]), []);
+        assert_eq!(bench.wait(45), []);
+    }
+    assert_eq!(bench.read(b"\x1b[201~q"), [Input::Paste, plain('q')]);
+}
+
+#[test]
+fn a_paste_without_an_end_is_over_by_silence() {
+    let mut bench = Bench::new();
+    bench.read(b"\x1b[200~qqq");
+    assert_eq!(bench.wait(999), []);
+    assert_eq!(bench.wait(1), [Input::Paste]);
+    assert_eq!(bench.read(b"q\x1b[201~"), [plain('q')], "a late end is nothing");
+
+    bench.read(b"\x1b[200~");
+    let keys = (0..30).flat_map(|_| {
+        let mut inputs = bench.read(b"q");
+        inputs.extend(bench.wait(500));
+        inputs
+    });
+    let keys: Vec<Input> = keys.collect();
+    assert_eq!((keys[0], keys[1]), (Input::Paste, plain('q')), "somebody presses a key again and again");
+
+    let long = [&b"\x1b[200~"[..], &vec![b'q'; (1 << 20) + 3]].concat();
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(&long), []);
+    assert_eq!(bench.wait(199), []);
+    assert_eq!(bench.wait(1), [Input::Paste], "after so much a short silence is enough");
+    assert_eq!(bench.read(b"q"), [plain('q')]);
+}
+
+#[test]
+fn nothing_of_a_long_paste_is_a_key() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~"), []);
+    for _ in 0..3000 {
+        assert_eq!(bench.read(&[b'q'; 1000]), []);
+        assert_eq!(bench.wait(5), []);
+    }
+    assert_eq!(bench.read(b"q\x1b[201~c"), [Input::Paste, plain('c')], "3 MB, 15 s");
+
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~"), []);
+    for _ in 0..150 {
+        assert_eq!(bench.read(b"q"), []);
+        assert_eq!(bench.wait(100), []);
+    }
+    assert_eq!(bench.read(b"q\x1b[201~c"), [Input::Paste, plain('c')], "over a thin line");
+}
+
+#[test]
+fn text_that_waited_for_the_reader_is_still_of_its_paste() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~q"), []);
+    // Nobody looked in between, so nobody knows that there was silence.
+    bench.now += Duration::from_secs(60);
+    assert_eq!(bench.read(b"q\x1b[201~"), [Input::Paste]);
+}
+
+#[test]
+fn answers_do_not_keep_a_paste_open() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b[200~q"), []);
+    let mut found = Vec::new();
+    for _ in 0..10 {
+        found.extend(bench.read(b"\x1b[0n"));
+        found.extend(bench.wait(150));
+    }
+    assert_eq!(found[0], Input::Paste, "a second after the last text");
+    assert_eq!(bench.read(b"q"), [plain('q')]);
+}
+
+#[test]
+fn a_sequence_without_an_end_is_given_up() {
+    for begun in [&b"\x1b]0;t"[..], b"\x1bP1", b"\x1b[1;", b"\x1bXx", b"\x1b[M"] {
+        let mut bench = Bench::new();
+        assert_eq!(bench.read(begun), []);
+        assert_eq!(bench.wait(1000), []);
+        assert_eq!(bench.read(b"q"), [plain('q')], "{:?}", String::from_utf8_lossy(begun));
+    }
+    let mut bench = Bench::new();
+    bench.read(b"\x1b]");
+    let mut keys = Vec::new();
+    for _ in 0..10 {
+        keys.extend(bench.read(b"q"));
+        bench.wait(300);
+    }
+    assert!(!keys.is_empty(), "somebody presses a key again and again");
+    let long = [&b"\x1bP"[..], &vec![b'q'; 5000]].concat();
+    assert!(read(&long).contains(&plain('q')), "a string has its length");
+}
+
+#[test]
+fn invalid_text_takes_no_key_with_it() {
+    for broken in [&b"\xc3"[..], b"\xe2\x96", b"\xf0\x90\x80", b"\xff", b"\x80", b"\xe2\x1b[A"] {
+        let inputs = read(&[broken, b"q"].concat());
+        assert_eq!(inputs.last(), Some(&plain('q')), "{broken:?}");
+    }
+}
+
+proptest! {
+    /// However a text of keys and answers is split, the same comes out.
+    #[test]
+    fn splits_do_not_count(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
+        let words: [&[u8]; 10] =
+            [b"q", b"\x1b[A", b"\x1b[0n", b"\x1b[?62;22c", "é".as_bytes(), b"\x1bOP", b"\x1b[5~", b"\x03", b"\x1b[200~q\x1b[201~", b"\x1b[3;4R"];
+        let text: Vec<u8> = parts.iter().flat_map(|part| words[*part]).copied().collect();
+        let whole = read(&text);
+        prop_assert_eq!(whole.len(), parts.len());
+        let mut bench = Bench::new();
+        let (mut rest, mut split) = (&text[..], Vec::new());
+        for cut in cuts {
+            let (now, later) = rest.split_at(cut.min(rest.len()));
+            split.extend(bench.read(now));
+            split.extend(bench.wait(30));
+            rest = later;
+        }
+        split.extend(bench.read(rest));
+        prop_assert_eq!(split, whole);
+    }
+
+    /// Whatever comes, a key after a while is a key.
+    #[test]
+    fn nothing_holds_the_keyboard(bytes in prop::collection::vec(prop_oneof![Just(0x1b_u8), Just(b'['), Just(b']'), Just(b'P'), any::<u8>()], 0..300)) {
+        let mut bench = Bench::new();
+        bench.read(&bytes);
+        bench.wait(12_000);
+        prop_assert_eq!(bench.decoder.deadline(), None);
+        let inputs = bench.read(b"q");
+        prop_assert_eq!(inputs.last(), Some(&plain('q')));
+    }
+}

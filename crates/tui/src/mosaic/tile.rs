@@ -1,0 +1,280 @@
+//! Characters that fill a part of their cell by the foreground: blocks, quadrants, sextants, octants, shades.
+
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
+/// Rows of the grid of a cell's parts: enough for halves, thirds and quarters. The grid has two columns.
+pub(crate) const GRID_ROWS: u32 = 12;
+/// Places of the grid.
+pub(crate) const PLACES: u32 = 2 * GRID_ROWS;
+const ALL: u32 = (1 << PLACES) - 1;
+
+/// Two parts of a cell and the characters that tell them apart. The first part has the top left corner.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tile {
+    /// The places of the first part, from the top left one along the rows.
+    first: u32,
+    symbols: [char; 2],
+}
+
+impl PartialEq for Tile {
+    fn eq(&self, other: &Self) -> bool {
+        self.first == other.first
+    }
+}
+
+impl Eq for Tile {}
+
+impl Tile {
+    /// The upper and the lower half.
+    pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
+    /// A quarter of the foreground in the background. What is in between is drawn by each font in its own way.
+    pub(crate) const LIGHT: Self = Self { first: 0x21_21_21, symbols: ['░', '▓'] };
+
+    /// Half of one and half of the other colour, finely mixed.
+    pub(crate) const MEDIUM: Self = Self { first: CHECKS, symbols: ['▒', '▒'] };
+
+    /// The characters that show the first and the second part by the foreground.
+    pub(crate) fn symbols(self) -> [char; 2] {
+        self.symbols
+    }
+
+    /// Number of places in each part.
+    pub(crate) fn sizes(self) -> [u32; 2] {
+        let first = self.first.count_ones();
+        [first, PLACES - first]
+    }
+
+    /// Number of places that each part of this tile shares with each part of the other.
+    pub(crate) fn shared(self, other: Self) -> [[u32; 2]; 2] {
+        let parts = |tile: Self| [tile.first, ALL & !tile.first];
+        parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
+    }
+}
+
+/// The tile that a character fills with the foreground, and whether the foreground is its second part. `None` for a character
+/// without blocks.
+pub(crate) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
+    // All others are letters, digits, signs.
+    if symbol < '▀' {
+        return None;
+    }
+    let mask = TABLE.masks.get(&symbol)?;
+    of_mask(*mask)
+}
+
+/// The places of a cell that a character fills with the foreground: 2 columns and 12 rows, from the top left one along the rows.
+/// `None` for a character without blocks.
+pub fn filled(symbol: char) -> Option<[bool; 24]> {
+    let mask = match symbol {
+        ' ' => 0,
+        '█' => ALL,
+        _ => *TABLE.masks.get(&symbol)?,
+    };
+    Some(std::array::from_fn(|place| mask >> place & 1 == 1))
+}
+
+/// The tile with these places in its first part, or in its second if they leave out the top left corner.
+fn of_mask(mask: u32) -> Option<(Tile, bool)> {
+    let is_second = mask & 1 == 0;
+    let first = if is_second { ALL & !mask } else { mask };
+    let symbol = |mask| TABLE.symbols.get(&mask).copied();
+    let tile = Tile { first, symbols: [symbol(first)?, symbol(ALL & !first)?] };
+    Some((tile, is_second))
+}
+
+/// Characters and the places that they fill.
+struct Table {
+    masks: HashMap<char, u32>,
+    symbols: HashMap<u32, char>,
+}
+
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    let mut table = Table { masks: HashMap::new(), symbols: HashMap::new() };
+    let mut add = |symbol: char, mask: u32| {
+        table.masks.entry(symbol).or_insert(mask);
+        table.symbols.entry(mask).or_insert(symbol);
+    };
+    for (mask, symbol) in (0..).zip(QUADRANTS) {
+        if !matches!(symbol, ' ' | '█') {
+            add(symbol, spread(mask, 2));
+        }
+    }
+    let light = Tile::LIGHT.first;
+    add('░', light);
+    add('▓', ALL & !light);
+    // Turned round it is another one in the grid and the same on the screen.
+    for mask in [CHECKS, ALL & !CHECKS] {
+        add('▒', mask);
+    }
+    let mut next = SEXTANTS;
+    for mask in 1..63 {
+        if !SEXTANTS_ELSEWHERE.contains(&mask) {
+            add(char::from_u32(next).unwrap_or(' '), spread(mask, 3));
+            next += 1;
+        }
+    }
+    let mut next = OCTANTS;
+    for mask in 0..256 {
+        if let Some((_, symbol)) = OCTANTS_ELSEWHERE.iter().find(|(other, _)| *other == mask) {
+            add(*symbol, spread(mask, 4));
+        } else if quadrants(mask).is_none() {
+            add(char::from_u32(next).unwrap_or(' '), spread(mask, 4));
+            next += 1;
+        }
+    }
+    table
+});
+
+/// Every other place.
+const CHECKS: u32 = 0x99_99_99;
+
+/// Characters by the places that they fill, in a grid of two columns and two rows, lowest bit first (Unicode, "Block Elements").
+const QUADRANTS: [char; 16] =
+    [' ', '▘', '▝', '▀', '▖', '▌', '▞', '▛', '▗', '▚', '▐', '▜', '▄', '▙', '▟', '█'];
+/// The first sextant (Unicode 13, "Symbols for Legacy Computing"). They follow each other by the places that they fill, but for
+/// the left and the right half.
+const SEXTANTS: u32 = 0x1_FB00;
+const SEXTANTS_ELSEWHERE: [u32; 2] = [0b01_01_01, 0b10_10_10];
+/// The first octant (Unicode 16, "Symbols for Legacy Computing Supplement"). They follow each other in the same way, but for those
+/// that were there before.
+const OCTANTS: u32 = 0x1_CD00;
+const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
+    (0b00_00_00_01, '\u{1CEA8}'),
+    (0b00_00_00_10, '\u{1CEAB}'),
+    (0b00_00_00_11, '\u{1FB82}'),
+    (0b00_01_01_00, '\u{1FBE6}'),
+    (0b00_10_10_00, '\u{1FBE7}'),
+    (0b00_11_11_11, '\u{1FB85}'),
+    (0b01_00_00_00, '\u{1CEA3}'),
+    (0b10_00_00_00, '\u{1CEA0}'),
+    (0b11_00_00_00, '▂'),
+    (0b11_11_11_00, '▆'),
+];
+
+/// The places of the grid that those of a coarser one of so many rows cover.
+fn spread(mask: u32, rows: u32) -> u32 {
+    widened(mask, rows, GRID_ROWS)
+}
+
+/// The same for another grid of two columns.
+fn widened(mask: u32, from: u32, to: u32) -> u32 {
+    let each = to / from;
+    (0..2 * to)
+        .filter(|place| mask >> (place / 2 / each * 2 + place % 2) & 1 == 1)
+        .fold(0, |all, place| all | 1 << place)
+}
+
+/// The quadrants that these octants fill, if they fill whole ones.
+fn quadrants(mask: u32) -> Option<u32> {
+    (0..16).find(|quadrants| spread(*quadrants, 2) == spread(mask, 4))
+}
+
+/// Grids that a cell is divided into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Grid {
+    Halves,
+    Quadrants,
+    /// And quadrants.
+    Sextants,
+    Octants,
+}
+
+/// A way to divide a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Division {
+    /// The pixels of the first part, from the top left one along the rows.
+    pub(super) first: u32,
+    pub(super) tile: Tile,
+}
+
+impl Grid {
+    /// Pixels across a cell.
+    pub(crate) fn columns(self) -> u32 {
+        if self == Self::Halves { 1 } else { 2 }
+    }
+
+    /// Pixels down a cell: as many as tell all its divisions apart.
+    pub(crate) fn rows(self) -> u32 {
+        match self {
+            Self::Halves | Self::Quadrants => 2,
+            Self::Sextants => 6,
+            Self::Octants => 4,
+        }
+    }
+
+    /// All ways to divide a cell of two columns, the halves first. Most differ from the one before in one part.
+    pub(super) fn divisions(self) -> &'static [Division] {
+        static QUADRANTS: LazyLock<Vec<Division>> = LazyLock::new(|| divisions(2, &[2]));
+        static SEXTANTS: LazyLock<Vec<Division>> = LazyLock::new(|| divisions(6, &[2, 3]));
+        static OCTANTS: LazyLock<Vec<Division>> = LazyLock::new(|| divisions(4, &[4]));
+        match self {
+            Self::Halves => &[],
+            Self::Quadrants => &QUADRANTS,
+            Self::Sextants => &SEXTANTS,
+            Self::Octants => &OCTANTS,
+        }
+    }
+}
+
+/// The ways to fill parts of which these are in the height of a cell, in pixels of which so many are.
+fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<Division> {
+    let mut divisions = vec![Division { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
+    for rows in part_rows {
+        let half = 1_u32 << (2 * rows - 1);
+        // Gray's code; the top left part is always in.
+        for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
+            let of_tile = of_mask(spread(mask, *rows)).map(|(tile, _)| tile);
+            let is_new = |tile: &Tile| divisions.iter().all(|division: &Division| division.tile != *tile);
+            if let Some(tile) = of_tile.filter(is_new) {
+                divisions.push(Division { first: widened(mask, *rows, pixel_rows), tile });
+            }
+        }
+    }
+    divisions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_division_of_every_grid_has_its_characters() {
+        for (grid, count) in [(Grid::Quadrants, 7), (Grid::Sextants, 31 + 6), (Grid::Octants, 127)] {
+            let divisions = grid.divisions();
+            let mut seen = std::collections::HashSet::new();
+            for Division { first, tile } in divisions {
+                assert_eq!(tile.first, widened(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
+                let [front, back] = tile.symbols();
+                assert_eq!(of_symbol(front), Some((*tile, false)), "{front}");
+                assert_eq!(of_symbol(back), Some((*tile, true)), "{back}");
+                assert!(seen.insert(front) && seen.insert(back));
+            }
+            assert_eq!(divisions.len(), count, "{grid:?}");
+            assert_eq!(divisions[0].tile, Tile::HALVES);
+        }
+    }
+
+    #[test]
+    fn known_characters() {
+        let symbol = |mask, rows| TABLE.symbols[&spread(mask, rows)];
+        assert_eq!(symbol(0b1001, 2), '▚');
+        assert_eq!(symbol(1, 3), '🬀');
+        assert_eq!(symbol(0b01_01_01, 3), '▌');
+        assert_eq!(symbol(62, 3), '🬻');
+        // BLOCK OCTANT-3, BLOCK OCTANT-23, and the last one, BLOCK OCTANT-2345678.
+        assert_eq!(symbol(0b100, 4), '\u{1CD00}');
+        assert_eq!(symbol(0b110, 4), '\u{1CD01}');
+        assert_eq!(symbol(0b1111_1110, 4), '\u{1CDE5}');
+    }
+
+    #[test]
+    fn shades_fill_a_quarter_a_half_and_three_quarters() {
+        for (symbol, share) in [('░', 6), ('▒', 12), ('▓', 18)] {
+            let (tile, is_second) = of_symbol(symbol).expect("a tile");
+            assert_eq!(tile.sizes()[usize::from(is_second)], share, "{symbol}");
+        }
+        assert_eq!(of_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
+        assert_eq!(of_symbol('a'), None);
+    }
+}

@@ -1,0 +1,35 @@
+//! Abilities of a terminal, by its name.
+
+use crate::terminals::Brand;
+
+/// Whether the terminal knows REP (ECMA-48 8.3.103: the character before so many times more), by the names that it
+/// leaves in the environment. Many call themselves `xterm-256color`, and not all of those do.
+pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
+    const TERMS: [&str; 8] =
+        ["xterm-kitty", "alacritty", "foot", "xterm-ghostty", "wezterm", "contour", "tmux", "rio"];
+    let get = |name: &str| variable(name).unwrap_or_default();
+    let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
+    TERMS.iter().any(|name| term.starts_with(name))
+        || (get("TMUX").is_empty() && Brand::of_program(&program).is_some_and(Brand::has_colors_and_repeats))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_terminals_that_are_known_to_repeat() {
+        let known = |variables: &[(&str, &str)]| {
+            can_repeat(|name| {
+                variables.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned())
+            })
+        };
+        assert!(known(&[("TERM", "foot-extra")]));
+        assert!(known(&[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux")]));
+        assert!(known(&[("TERM", "xterm-256color"), ("TERM_PROGRAM", "vscode")]));
+        assert!(!known(&[("TERM", "screen-256color"), ("TERM_PROGRAM", "vscode"), ("TMUX", "/tmp/tmux")]));
+        assert!(!known(&[("TERM", "xterm-256color")]));
+        assert!(!known(&[("TERM", "linux")]));
+        assert!(!known(&[]));
+    }
+}

@@ -1,0 +1,135 @@
+//! Colours that are worth being set at a cell.
+
+use super::cost_model::CostModel;
+use super::look::Mosaic;
+use super::shade::{Shade, digits};
+use crate::color::nearest_256;
+
+/// The most of them for one half, and for both together.
+const MOST: usize = 6;
+/// No colour is looked for that serves longer than this.
+const LONGEST: usize = 8;
+
+/// Themes of 22 colours put their own in the place of the first ones of the cube.
+const FIRST_UNTOUCHED: u8 = 22;
+
+/// Colours for the parts of one cell.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Candidates {
+    pub(super) first: Vec<Shade>,
+    pub(super) second: Vec<Shade>,
+    /// For both parts at once.
+    pub(super) both: Vec<Shade>,
+}
+
+/// For the first of these cells. Each candidate serves as many of the cells after it as it can.
+pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> Candidates {
+    let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
+    let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
+    Candidates {
+        first: shades(&column(0), model),
+        second: shades(&column(1), model),
+        both: shades(&both, model),
+    }
+}
+
+fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), model: CostModel) -> Vec<Shade> {
+    let mut shades = Vec::with_capacity(MOST);
+    let Some(first) = wanted.clone().next() else { return shades };
+    let mut add = |shade| {
+        if shades.len() < MOST && !shades.contains(&shade) {
+            shades.push(shade);
+        }
+    };
+    let Shade::Rgb(_) = first else {
+        add(first);
+        return shades;
+    };
+    for span in model.spans {
+        let box_ = common(wanted.clone(), *span);
+        add(Shade::Rgb(box_.shortest()));
+        let index = nearest_256(box_.mean());
+        let fixed = Shade::Palette(index);
+        if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.holds(rgb)) {
+            add(fixed);
+        }
+    }
+    shades
+}
+
+/// Colours that serve a row of wanted ones.
+struct Common {
+    low: [u8; 3],
+    high: [u8; 3],
+    sum: [u32; 3],
+    count: u32,
+}
+
+/// The colours within `span` of as many as possible.
+fn common(wanted: impl Iterator<Item = Shade>, span: u8) -> Common {
+    let mut common = Common { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
+    for shade in wanted.take(LONGEST) {
+        let Shade::Rgb(rgb) = shade else { break };
+        let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
+        let high = std::array::from_fn(|i| common.high[i].min(rgb[i].saturating_add(span)));
+        if (0..3).any(|i| low[i] > high[i]) {
+            break;
+        }
+        (common.low, common.high) = (low, high);
+        common.sum = std::array::from_fn(|i| common.sum[i] + u32::from(rgb[i]));
+        common.count += 1;
+    }
+    common
+}
+
+impl Common {
+    fn mean(&self) -> [u8; 3] {
+        let count = self.count.max(1);
+        let mean = |i: usize| u8::try_from((self.sum[i] + count / 2) / count).unwrap_or(u8::MAX);
+        std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
+    }
+
+    /// The one of fewest digits; of those, the nearest to the mean.
+    fn shortest(&self) -> [u8; 3] {
+        let mean = self.mean();
+        std::array::from_fn(|i| {
+            let fewest = digits(self.low[i]);
+            let most = [9, 99, u8::MAX][fewest as usize - 1];
+            mean[i].min(most)
+        })
+    }
+
+    fn holds(&self, rgb: [u8; 3]) -> bool {
+        (0..3).all(|i| (self.low[i]..=self.high[i]).contains(&rgb[i]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(values: &[u8]) -> Vec<Option<Mosaic>> {
+        let halves = |value: &u8| Mosaic::halves([Shade::Rgb([*value, 50, 100]), Shade::Rgb([0, 0, 0])]);
+        values.iter().map(|value| Some(halves(value))).collect()
+    }
+
+    #[test]
+    fn a_colour_serves_as_many_neighbours_as_it_can() {
+        // 20 to 22 have 21 in common; 24 does not.
+        let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
+        assert_eq!(found.first, [Shade::Rgb([21, 50, 99])]);
+        assert_eq!(found.second, [Shade::Rgb([0, 0, 0])], "16 may be another colour");
+        assert_eq!(found.both.len(), 1, "the halves have nothing in common");
+        let greys = [Some(Mosaic::plain(Shade::Rgb([8, 8, 8])))];
+        assert_eq!(candidates(&greys, CostModel::EXACT).first, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
+    }
+
+    #[test]
+    fn what_is_no_colour_of_three_numbers_is_taken_as_it_is() {
+        let cells = [Some(Mosaic::halves([Shade::Ground, Shade::Palette(3)])), None];
+        let found = candidates(&cells, CostModel::MOVING);
+        assert_eq!((found.first, found.second), (vec![Shade::Ground], vec![Shade::Palette(3)]));
+        let found = candidates(&[None], CostModel::MOVING);
+        assert!(found.first.is_empty() && found.both.is_empty());
+    }
+}

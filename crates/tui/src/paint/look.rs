@@ -1,0 +1,240 @@
+//! The look of a cell, however it was drawn.
+
+use ratatui::buffer::Cell;
+use ratatui::style::Modifier;
+use unicode_width::UnicodeWidthStr;
+
+use super::pen::{Pen, Wish};
+use super::shade::{Layer, Shade};
+use crate::color::ColorDepth;
+use crate::mosaic::{PLACES, Tile, of_symbol};
+
+/// One cell of the screen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// Nobody knows.
+    Unknown,
+    /// Two colours, and which part of it has which: a blank is two halves of one colour.
+    Mosaic(Mosaic),
+    /// A character.
+    Text(Text),
+    /// The right part of a character that is two columns wide.
+    Covered,
+}
+
+/// A cell of two colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Mosaic {
+    pub(super) tile: Tile,
+    /// Shades of the first and of the second part.
+    pub(super) pair: [Shade; 2],
+}
+
+impl Mosaic {
+    /// Whatever looks the same is the same.
+    pub(super) fn new(tile: Tile, pair: [Shade; 2]) -> Self {
+        Self { tile: if pair[0] == pair[1] { Tile::HALVES } else { tile }, pair }
+    }
+
+    pub(super) fn halves(pair: [Shade; 2]) -> Self {
+        Self { tile: Tile::HALVES, pair }
+    }
+
+    /// One colour.
+    pub(super) fn plain(shade: Shade) -> Self {
+        Self::halves([shade; 2])
+    }
+
+    /// The mosaic of a character. `None` for a character without blocks.
+    fn of(symbol: &str, fg: Shade, bg: Shade) -> Option<Self> {
+        match symbol {
+            " " => return Some(Self::plain(bg)),
+            "█" => return Some(Self::plain(fg)),
+            _ => {}
+        }
+        let (tile, is_second) = of_symbol(symbol.chars().next()?)?;
+        Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
+    }
+
+    /// Pairs of shades that meet in this cell and in the other, with the share of the cell, of 2, where they do.
+    pub(super) fn against(self, other: Self) -> impl Iterator<Item = (Shade, Shade, f32)> {
+        let shared = self.tile.shared(other.tile);
+        let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
+        pairs.filter(move |(own, its)| shared[*own][*its] > 0).map(move |(own, its)| {
+            let part = 2.0 * shared[own][its] as f32 / PLACES as f32;
+            (self.pair[own], other.pair[its], part)
+        })
+    }
+}
+
+/// A character, which may be made of several code points, and its style.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Text {
+    pub(super) symbol: Box<str>,
+    /// 1 or 2.
+    pub(super) columns: u16,
+    pub(super) pen: Pen,
+}
+
+impl Text {
+    /// Whether it is one code point of one column.
+    pub(super) fn is_plain(&self) -> bool {
+        self.columns == 1 && self.symbol.chars().nth(1).is_none()
+    }
+}
+
+/// The four ways to fill the two parts of a cell by the two colours of the pen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Glyph {
+    Blank,
+    First,
+    Second,
+    Full,
+}
+
+/// Modifiers that are seen on a blank.
+const ON_BLANKS: Modifier = Modifier::REVERSED
+    .union(Modifier::UNDERLINED)
+    .union(Modifier::SLOW_BLINK)
+    .union(Modifier::RAPID_BLINK)
+    .union(Modifier::CROSSED_OUT);
+
+impl Glyph {
+    pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
+
+    /// The character by which it fills this tile.
+    pub(super) fn symbol(self, tile: Tile) -> char {
+        match self {
+            Self::Blank => ' ',
+            Self::First => tile.symbols()[0],
+            Self::Second => tile.symbols()[1],
+            Self::Full => '█',
+        }
+    }
+
+    /// Layers that fill the first and the second part.
+    pub(super) fn layers(self) -> [Layer; 2] {
+        match self {
+            Self::Blank => [Layer::Background; 2],
+            Self::First => [Layer::Foreground, Layer::Background],
+            Self::Second => [Layer::Background, Layer::Foreground],
+            Self::Full => [Layer::Foreground; 2],
+        }
+    }
+
+    /// The wish to the pen; it leaves out colours that the mosaic does not show.
+    pub(super) fn wish(self, pair: [Shade; 2]) -> Wish {
+        let color =
+            |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
+        let matters = if self == Self::Blank { ON_BLANKS } else { Modifier::all() };
+        Wish {
+            fg: color(Layer::Foreground),
+            bg: color(Layer::Background),
+            modifier: Modifier::empty(),
+            matters,
+            link: 0,
+        }
+    }
+
+    /// Whether it can show these colours.
+    pub(super) fn shows(self, pair: [Shade; 2]) -> bool {
+        let [first, second] = self.layers();
+        pair[0].fits(first) && pair[1].fits(second) && (first != second || pair[0] == pair[1])
+    }
+}
+
+impl Look {
+    /// A blank of the terminal's own background.
+    pub(super) const BLANK: Self = Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [Shade::Ground; 2] });
+
+    /// The look of a cell on a terminal of this depth.
+    pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
+        let shade = |color, layer| {
+            let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };
+            Shade::of(color, layer)
+        };
+        let (fg, bg) = (shade(cell.fg, Layer::Foreground), shade(cell.bg, Layer::Background));
+        let (symbol, columns) = printable(cell.symbol());
+        let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
+        let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::of(symbol, fg, bg)).flatten();
+        mosaic.map_or_else(
+            || {
+                Self::Text(Text {
+                    symbol: symbol.into(),
+                    columns,
+                    pen: Pen { fg, bg, modifier: cell.modifier, link: 0 },
+                })
+            },
+            Self::Mosaic,
+        )
+    }
+
+    /// Columns that it takes.
+    pub(super) fn columns(&self) -> u16 {
+        match self {
+            Self::Text(text) => text.columns,
+            Self::Unknown | Self::Mosaic(_) | Self::Covered => 1,
+        }
+    }
+}
+
+/// The symbol of a cell and its columns; a blank for what would move the cursor or nothing at all.
+fn printable(symbol: &str) -> (&str, u16) {
+    let columns = symbol.width();
+    if columns == 0 || columns > 2 || symbol.chars().any(char::is_control) {
+        (" ", 1)
+    } else {
+        (symbol, if columns == 2 { 2 } else { 1 })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ratatui::style::Color;
+
+    use super::*;
+
+    fn look(symbol: &str, fg: Color, bg: Color, modifier: Modifier) -> Look {
+        let mut cell = Cell::default();
+        cell.set_symbol(symbol).set_fg(fg).set_bg(bg);
+        cell.modifier = modifier;
+        Look::of(&cell, ColorDepth::TrueColor)
+    }
+
+    #[test]
+    fn what_looks_the_same_is_the_same() {
+        let none = Modifier::empty();
+        let (a, b) = (Color::Rgb(1, 2, 3), Color::Rgb(4, 5, 6));
+        assert_eq!(look("▀", a, b, none), look("▄", b, a, none));
+        assert_eq!(look("█", a, b, none), look(" ", b, a, none));
+        assert_eq!(look("▚", a, b, none), look("▞", b, a, none));
+        assert_eq!(look("▚", a, a, none), look(" ", b, a, none));
+        assert_ne!(look("▚", a, b, none), look("▀", a, b, none));
+        assert_eq!(look(" ", a, b, Modifier::BOLD), look(" ", b, b, none));
+        assert_ne!(look(" ", a, b, Modifier::UNDERLINED), look(" ", a, b, none));
+        assert_ne!(look("▀", a, b, Modifier::DIM), look("▀", a, b, none));
+        assert_ne!(look("x", a, b, none), look("x", b, b, none));
+        assert_ne!(look("█", Color::Reset, a, none), look(" ", a, Color::Reset, none));
+    }
+
+    #[test]
+    fn nothing_that_moves_the_cursor_is_printed() {
+        for symbol in ["", "\n", "\x1b[2J", "\u{301}", "a\x07"] {
+            assert_eq!(
+                look(symbol, Color::Reset, Color::Reset, Modifier::empty()),
+                Look::BLANK,
+                "{symbol:?}"
+            );
+        }
+        assert_eq!(look("日", Color::Red, Color::Reset, Modifier::empty()).columns(), 2);
+        assert_eq!(look("e\u{301}", Color::Red, Color::Reset, Modifier::empty()).columns(), 1);
+    }
+
+    #[test]
+    fn without_colours_there_are_none() {
+        let mut cell = Cell::default();
+        cell.set_symbol("x").set_fg(Color::Red).set_bg(Color::Blue);
+        let Look::Text(text) = Look::of(&cell, ColorDepth::None) else { panic!("a character") };
+        assert_eq!((text.pen.fg, text.pen.bg), (Shade::Ink, Shade::Ground));
+    }
+}

@@ -1,0 +1,176 @@
+//! The colours of a terminal.
+
+use ratatui::style::Color;
+
+use crate::color::fixed;
+
+/// A colour as the terminal knows it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shade {
+    /// The terminal's own background.
+    Ground,
+    /// The terminal's own foreground.
+    Ink,
+    /// One of the palette. The first 16 are the user's, the others a cube and greys.
+    Palette(u8),
+    /// Red, green, blue in sRGB.
+    Rgb([u8; 3]),
+}
+
+/// The two colours of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Layer {
+    Foreground,
+    Background,
+}
+
+impl Shade {
+    /// The shade of a cell's colour in this layer.
+    pub(super) fn of(color: Color, layer: Layer) -> Self {
+        match color {
+            Color::Reset => match layer {
+                Layer::Foreground => Self::Ink,
+                Layer::Background => Self::Ground,
+            },
+            Color::Black => Self::Palette(0),
+            Color::Red => Self::Palette(1),
+            Color::Green => Self::Palette(2),
+            Color::Yellow => Self::Palette(3),
+            Color::Blue => Self::Palette(4),
+            Color::Magenta => Self::Palette(5),
+            Color::Cyan => Self::Palette(6),
+            Color::Gray => Self::Palette(7),
+            Color::DarkGray => Self::Palette(8),
+            Color::LightRed => Self::Palette(9),
+            Color::LightGreen => Self::Palette(10),
+            Color::LightYellow => Self::Palette(11),
+            Color::LightBlue => Self::Palette(12),
+            Color::LightMagenta => Self::Palette(13),
+            Color::LightCyan => Self::Palette(14),
+            Color::White => Self::Palette(15),
+            Color::Indexed(index) => Self::Palette(index),
+            Color::Rgb(r, g, b) => Self::Rgb([r, g, b]),
+        }
+    }
+
+    /// Whether this layer can have it.
+    pub(super) fn fits(self, layer: Layer) -> bool {
+        match self {
+            Self::Ground => layer == Layer::Background,
+            Self::Ink => layer == Layer::Foreground,
+            Self::Palette(_) | Self::Rgb(_) => true,
+        }
+    }
+
+    /// A number that no other shade has.
+    pub(super) fn number(self) -> u32 {
+        match self {
+            Self::Ground => 1 << 24,
+            Self::Ink => 2 << 24,
+            Self::Palette(index) => 3 << 24 | u32::from(index),
+            Self::Rgb([r, g, b]) => u32::from_be_bytes([0, r, g, b]),
+        }
+    }
+
+    /// sRGB values, if they are known.
+    pub(super) fn rgb(self) -> Option<[u8; 3]> {
+        match self {
+            Self::Rgb(rgb) => Some(rgb),
+            Self::Palette(index) => fixed(index),
+            Self::Ground | Self::Ink => None,
+        }
+    }
+
+    /// Appends the parameters of SGR that set it in this layer, which must be one that it fits.
+    pub(super) fn push(self, layer: Layer, out: &mut Vec<u8>) {
+        let base = match layer {
+            Layer::Foreground => 30,
+            Layer::Background => 40,
+        };
+        match self {
+            Self::Ground | Self::Ink => push_number(base + 9, out),
+            Self::Palette(index @ 0..8) => push_number(base + u16::from(index), out),
+            Self::Palette(index @ 8..16) => push_number(base + 52 + u16::from(index), out),
+            Self::Palette(index) => push_list(&[base + 8, 5, u16::from(index)], out),
+            Self::Rgb([r, g, b]) => {
+                push_list(&[base + 8, 2, u16::from(r), u16::from(g), u16::from(b)], out);
+            }
+        }
+    }
+
+    /// Bytes that [`Shade::push`] appends.
+    pub(super) fn length(self) -> u32 {
+        match self {
+            Self::Ground | Self::Ink | Self::Palette(0..8) => 2,
+            // 90 to 97, but 100 to 107: the mean is of no use, the larger one is.
+            Self::Palette(8..16) => 3,
+            Self::Palette(index) => 5 + digits(index),
+            Self::Rgb(rgb) => 7 + rgb.map(digits).iter().sum::<u32>(),
+        }
+    }
+}
+
+/// Decimal digits of a number.
+pub(super) fn digits(number: u8) -> u32 {
+    1 + u32::from(number > 9) + u32::from(number > 99)
+}
+
+/// Appends a number in decimal digits.
+pub(super) fn push_number(number: u16, out: &mut Vec<u8>) {
+    if number > 9 {
+        push_number(number / 10, out);
+    }
+    out.push(b'0' + (number % 10) as u8);
+}
+
+/// Appends numbers with semicolons between them.
+fn push_list(numbers: &[u16], out: &mut Vec<u8>) {
+    for (i, number) in numbers.iter().enumerate() {
+        if i > 0 {
+            out.push(b';');
+        }
+        push_number(*number, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(shade: Shade, layer: Layer) -> String {
+        let mut out = Vec::new();
+        shade.push(layer, &mut out);
+        String::from_utf8(out).expect("ASCII")
+    }
+
+    #[test]
+    fn parameters_are_those_of_ecma_48_and_xterm() {
+        use Layer::{Background, Foreground};
+        assert_eq!(text(Shade::Ink, Foreground), "39");
+        assert_eq!(text(Shade::Ground, Background), "49");
+        assert_eq!(text(Shade::Palette(3), Foreground), "33");
+        assert_eq!(text(Shade::Palette(3), Background), "43");
+        assert_eq!(text(Shade::Palette(8), Foreground), "90");
+        assert_eq!(text(Shade::Palette(15), Background), "107");
+        assert_eq!(text(Shade::Palette(16), Foreground), "38;5;16");
+        assert_eq!(text(Shade::Rgb([1, 23, 255]), Background), "48;2;1;23;255");
+    }
+
+    #[test]
+    fn lengths_are_those_of_the_parameters() {
+        for shade in
+            (16..=255).map(Shade::Palette).chain([Shade::Rgb([0, 10, 100]), Shade::Rgb([9, 99, 255])])
+        {
+            assert_eq!(text(shade, Layer::Foreground).len(), shade.length() as usize, "{shade:?}");
+        }
+    }
+
+    #[test]
+    fn the_palette_is_that_of_xterm() {
+        assert_eq!(Shade::Palette(16).rgb(), Some([0, 0, 0]));
+        assert_eq!(Shade::Palette(67).rgb(), Some([95, 135, 175]));
+        assert_eq!(Shade::Palette(231).rgb(), Some([255, 255, 255]));
+        assert_eq!(Shade::Palette(255).rgb(), Some([238, 238, 238]));
+        assert_eq!(Shade::Palette(15).rgb(), None);
+    }
+}

@@ -1,0 +1,143 @@
+//! The cells that the painter is aimed at.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::fidelity::Fidelity;
+use super::look::{Look, Mosaic};
+use crate::color::ColorDepth;
+
+/// A screen that is wanted.
+#[derive(Debug)]
+pub(super) struct Wanted {
+    pub(super) columns: u16,
+    pub(super) rows: u16,
+    looks: Vec<Look>,
+    pub(super) picture: Rect,
+    /// Words in these cells come after the picture.
+    pub(super) later: Rect,
+    pub(super) fidelity: Fidelity,
+    depth: ColorDepth,
+}
+
+/// Parts of the screen, in the order in which they are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Region {
+    Words,
+    Picture,
+    /// Words that wait for the picture.
+    Later,
+}
+
+impl Wanted {
+    /// Nothing at all.
+    pub(super) fn nothing(depth: ColorDepth) -> Self {
+        Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
+    }
+
+    pub(super) fn new(buffer: &Buffer, picture: Rect, fidelity: Fidelity, depth: ColorDepth) -> Self {
+        let (columns, rows) = (buffer.area.width, buffer.area.height);
+        let picture = picture.intersection(Rect::new(0, 0, columns, rows));
+        Self { columns, rows, looks: looks(buffer, depth), picture, later: Rect::ZERO, fidelity, depth }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.looks.is_empty()
+    }
+
+    pub(super) fn row(&self, y: u16) -> &[Look] {
+        let columns = usize::from(self.columns);
+        &self.looks[usize::from(y) * columns..][..columns]
+    }
+
+    /// Whether a row that shows this picture shows that one as well.
+    pub(super) fn serves(&self, other: &Self, y: u16) -> bool {
+        let is_as_near = self.fidelity == other.fidelity
+            || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
+                && other.fidelity == Fidelity::Moving);
+        let columns = usize::from(self.picture.left())..usize::from(self.picture.right());
+        is_as_near
+            && (self.columns, self.picture) == (other.columns, other.picture)
+            && self.row(y).get(columns.clone()) == other.row(y).get(columns)
+    }
+
+    /// The colours of a cell of the picture; none of words, which may lie over it.
+    pub(super) fn mosaic(&self, x: u16, y: u16) -> Option<Mosaic> {
+        match self.row(y)[usize::from(x)] {
+            Look::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
+            Look::Mosaic(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
+        }
+    }
+
+    /// Words in these cells come after the picture; what is blank does not wait.
+    pub(super) fn with_later(self, later: Rect) -> Self {
+        Self { later, ..self }
+    }
+
+    /// The characters of these cells belong to a link.
+    pub(super) fn link(&mut self, cells: Rect, number: u16) {
+        let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
+        for place in cells.positions() {
+            let index = usize::from(place.y) * usize::from(self.columns) + usize::from(place.x);
+            if let Look::Text(text) = &mut self.looks[index] {
+                text.pen.link = number;
+            }
+        }
+    }
+
+    /// The part of the screen that a cell belongs to.
+    pub(super) fn region(&self, x: u16, y: u16) -> Region {
+        match () {
+            () if self.is_picture(x, y) => Region::Picture,
+            () if !self.later.contains((x, y).into()) => Region::Words,
+            () if self.row(y)[usize::from(x)] == Look::BLANK => Region::Words,
+            () => Region::Later,
+        }
+    }
+
+    /// Whether a cell belongs to the picture, be it of two colours or, without colours, a character.
+    pub(super) fn is_picture(&self, x: u16, y: u16) -> bool {
+        let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
+        self.picture.contains((x, y).into())
+            && match &self.row(y)[usize::from(x)] {
+                Look::Mosaic(_) => true,
+                Look::Text(text) => self.depth == ColorDepth::None && is_tone(&text.symbol),
+                Look::Covered | Look::Unknown => false,
+            }
+    }
+
+    /// Whether the picture is made of characters.
+    pub(super) fn is_ramp(&self) -> bool {
+        self.depth == ColorDepth::None
+    }
+
+    /// The rows of the picture, the middle one first.
+    pub(super) fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {
+        let (top, bottom) = (self.picture.top(), self.picture.bottom());
+        let middle = top + (bottom - top) / 2;
+        (0..=bottom - top).flat_map(move |away| {
+            let below = middle.checked_add(away).filter(|y| *y < bottom);
+            let above = middle.checked_sub(away).filter(|y| away > 0 && *y >= top);
+            [below, above].into_iter().flatten()
+        })
+    }
+}
+
+/// Looks of a buffer's cells.
+pub(super) fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<Look> {
+    let columns = usize::from(buffer.area.width.max(1));
+    let mut looks: Vec<Look> = buffer.content.iter().map(|cell| Look::of(cell, depth)).collect();
+    for row in looks.chunks_mut(columns) {
+        let mut x = 0;
+        while x < row.len() {
+            let end = x + usize::from(row[x].columns());
+            if end > row.len() {
+                row[x] = Look::BLANK;
+            } else {
+                row[x + 1..end].fill(Look::Covered);
+            }
+            x = end;
+        }
+    }
+    looks
+}

@@ -1,0 +1,125 @@
+//! Pictures among the lines of a terminal: without a screen of their own, and without questions to the terminal.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+
+use super::color::{self, ColorChoice, ColorDepth, Shades};
+use super::event::Window;
+use super::options::PreviewChoice;
+use super::paint::in_lines;
+use super::terminal;
+use super::view::preview::{Inks, shown_by, size_in_cells};
+use super::view::text::{columns, shortened};
+use crate::film::Picture;
+
+/// A narrower terminal shows no pictures.
+const LEAST_COLUMNS: u16 = 30;
+/// Pictures beside each other are not narrower.
+const LEAST_BESIDE: u16 = 20;
+/// Columns between them.
+const GAP: u16 = 2;
+/// Rows of a terminal that are left for words.
+const WORDS: u16 = 17;
+/// Rows of a picture in a terminal that has fewer.
+const LEAST_ROWS: u16 = 7;
+
+/// A picture, and what stands above it.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// Without control characters.
+    pub name: String,
+    /// Pictures that are printed together have one size.
+    pub picture: Picture,
+}
+
+/// Lines that show pictures beside each other, or below each other in a narrow terminal, in the colours that it has; without colours,
+/// in characters. Nothing for a terminal of less than 30 columns. Where stdout is none: for one of 80 columns and 24 rows.
+pub fn printed(pictures: &[Named], color: ColorChoice, is_terminal: bool) -> String {
+    let variable = |name: &str| std::env::var(name).ok();
+    let depth = color::depth(color, variable);
+    let shades = Shades::new(depth, color::ansi(&variable("TERM").unwrap_or_default()));
+    let inks = Inks { depth, shades: &shades, is_light: color::has_light_background(variable) };
+    let (size, aspect) = if is_terminal { room(&terminal::window(None)) } else { ((80, 24), 2.0) };
+    let buffers = laid_out(pictures, inks, size, aspect);
+    buffers.iter().map(|buffer| in_lines(buffer, depth != ColorDepth::None)).collect()
+}
+
+/// Some terminals say that they have no cells.
+fn room(window: &Window) -> ((u16, u16), f32) {
+    let size = (window.columns, window.rows);
+    let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
+    (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))
+}
+
+/// The pictures in one row or in several.
+fn laid_out(pictures: &[Named], inks: Inks<'_>, (across, down): (u16, u16), aspect: f32) -> Vec<Buffer> {
+    let count = pictures.len().max(1) as u16;
+    let beside = across.saturating_sub(GAP * (count - 1)) / count;
+    let rows = down.saturating_sub(WORDS).max(LEAST_ROWS);
+    if across < LEAST_COLUMNS {
+        Vec::new()
+    } else if beside >= LEAST_BESIDE {
+        vec![row(pictures, inks, (beside, rows), aspect)]
+    } else {
+        pictures.chunks(1).map(|one| row(one, inks, (across, rows), aspect)).collect()
+    }
+}
+
+/// Pictures beside each other with their names above, each in so many columns and rows at most.
+fn row(pictures: &[Named], inks: Inks<'_>, room: (u16, u16), aspect: f32) -> Buffer {
+    let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
+    let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
+    let names = pictures.iter().map(|one| columns(&one.name).min(room.0)).max().unwrap_or(0);
+    let stride = width.max(names) + GAP;
+    let mut buffer = Buffer::empty(Rect::new(0, 0, stride * pictures.len() as u16, height + 1));
+    for (x, one) in (0..).step_by(usize::from(stride)).zip(pictures) {
+        buffer.set_string(x, 0, shortened(&one.name, room.0), Style::new());
+        let area = Rect::new(x, 1, width, height);
+        buffer.merge(&shown_by(&one.picture, PreviewChoice::HalfBlock, inks, (area, aspect)));
+    }
+    buffer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::color::XTERM;
+
+    fn laid(size: (u16, u16), depth: ColorDepth) -> Vec<String> {
+        let picture = Picture { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
+        let named = |name: &str| Named { name: name.to_owned(), picture: picture.clone() };
+        let shades = Shades::new(depth, &XTERM);
+        let inks = Inks { depth, shades: &shades, is_light: false };
+        let buffers =
+            laid_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
+        let text: String = buffers.iter().map(|buffer| in_lines(buffer, false)).collect();
+        text.lines().map(str::to_owned).collect()
+    }
+
+    fn widest(lines: &[String]) -> usize {
+        lines.iter().map(|line| line.chars().count()).max().unwrap_or(0)
+    }
+
+    #[test]
+    fn they_are_beside_each_other_where_there_is_room() {
+        let lines = laid((100, 60), ColorDepth::TrueColor);
+        assert!(lines[0].starts_with("a.png ") && lines[0].contains("b.png"), "{lines:?}");
+        assert_eq!((lines.len(), widest(&lines)), (1 + 12, 32 * 3 + 2 * 2), "{lines:?}");
+    }
+
+    #[test]
+    fn they_are_below_each_other_in_a_narrow_terminal_and_nowhere_in_a_narrower_one() {
+        let lines = laid((40, 24), ColorDepth::TrueColor);
+        assert_eq!((lines.len(), lines[8].as_str()), (3 * 8, "b.png"), "{lines:?}");
+        assert!(widest(&lines) <= 40, "{lines:?}");
+        assert!(laid((29, 24), ColorDepth::TrueColor).is_empty());
+        assert!(!laid((30, 1), ColorDepth::TrueColor).is_empty());
+    }
+
+    #[test]
+    fn without_colours_they_are_characters() {
+        let lines = laid((100, 60), ColorDepth::None);
+        assert!(lines.len() > 8 && lines[1..].iter().all(|line| line.is_ascii()), "{lines:?}");
+    }
+}

@@ -1,0 +1,89 @@
+//! The terminal: its window, its colours, and the means by which pictures are shown.
+
+use std::time::{Duration, Instant};
+
+use super::Setup;
+use crate::color::{Ansi, ColorDepth, Shades};
+use crate::event::{FrameReport, Window};
+use crate::graphics::Protocol;
+use crate::known::Ask;
+use crate::mosaic::Grid;
+use crate::pixels::PixelRequest;
+use crate::preview_kind::PreviewKind;
+use crate::terminals::Abilities;
+
+/// The terminal as far as it is known.
+pub(crate) struct DisplayState {
+    pub window: Window,
+    pub kind: PreviewKind,
+    pub depth: ColorDepth,
+    pub shades: Shades,
+    /// The terminal's 16 colours.
+    pub ansi: Ansi,
+    /// Questions to the terminal.
+    pub ask: Ask,
+    /// Abilities of the terminal besides text.
+    pub abilities: Abilities,
+    /// Time after which the end of a render is worth a notification. `None` for none.
+    pub notify_after: Option<Duration>,
+    /// Whether its window has the focus, as far as it says.
+    pub has_focus: bool,
+    /// Whether the terminal's background is light.
+    pub is_light: bool,
+    /// Pixels that the user wants and the terminal has not confirmed.
+    pub pixels: Option<PixelRequest>,
+    /// Time at which the user is told that the terminal has not answered.
+    pub pixels_until: Option<Instant>,
+    /// Cost of the last frame.
+    pub frame: Option<FrameReport>,
+}
+
+impl DisplayState {
+    pub(super) fn new(setup: &Setup, now: Instant) -> Self {
+        let pixels = setup.ask.pixels.filter(|request| !request.is_known);
+        Self {
+            pixels,
+            pixels_until: pixels.map(|request| request.deadline(now)),
+            window: setup.window,
+            kind: setup.preview,
+            depth: setup.depth,
+            shades: Shades::new(setup.depth, &setup.ansi),
+            ansi: setup.ansi,
+            ask: setup.ask,
+            abilities: setup.abilities,
+            notify_after: setup.notify_after,
+            has_focus: true,
+            is_light: setup.is_light,
+            frame: None,
+        }
+    }
+
+    /// Pixels of the preview in the width of a cell.
+    pub(crate) fn pixels_across(&self) -> u32 {
+        /// More are not worth their bytes.
+        const MOST: u32 = 10;
+        /// Pixels of the whole window: summing, developing and encoding those of its picture takes some 45 bytes each.
+        const MOST_PIXELS: f32 = 2_400_000.0;
+        /// The same for sixels, which themselves take as much again.
+        const MOST_IN_SIXELS: f32 = 1_600_000.0;
+        match self.kind {
+            PreviewKind::Pixels(protocol) => {
+                let most = match protocol {
+                    Protocol::Sixel => MOST_IN_SIXELS,
+                    Protocol::Kitty | Protocol::Iterm => MOST_PIXELS,
+                };
+                let window = &self.window;
+                let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
+                let affordable = (most / squares.max(1.0)).sqrt() as u32;
+                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MOST)
+            }
+            kind => kind.grid().map_or(1, Grid::columns),
+        }
+    }
+
+    /// Whether colours are mixed from those that the terminal has.
+    pub(crate) fn mixes_colors(&self) -> bool {
+        matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
+            || self.kind == PreviewKind::Pixels(Protocol::Sixel)
+    }
+}

@@ -1,0 +1,379 @@
+//! The newest request to the worker, and what it is made of.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::choice::Choice;
+use crate::math::DVec3;
+use crate::pipeline::FileRead;
+use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
+use crate::pipeline::settings::{CameraChange, Effective, Overrides, OwnSettings, View};
+use crate::scene::description::{Integrator, Pose, Shadows};
+use crate::scene::sanitize::visible;
+use crate::scene::{changes, is_mesh};
+
+/// Settings that keys changed, on top of the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Toggles {
+    pub shadows: Option<Shadows>,
+    pub integrator: Option<Integrator>,
+    pub dof: Option<bool>,
+    pub photons: Option<bool>,
+    pub view: Option<View>,
+    pub camera: CameraChange,
+    pub exposure: Option<f32>,
+}
+
+impl Toggles {
+    /// The same as options of a call. A camera in an orbiter file cannot be set in one.
+    pub(crate) fn options(&self, has_orbiter: bool) -> Vec<String> {
+        let on_off = |is_on: bool| if is_on { "on" } else { "off" };
+        let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
+        let CameraChange { pose, fov, focus } = self.camera;
+        let mut options: Vec<String> = [
+            self.integrator.map(|it| format!("--integrator {}", it.name())),
+            self.shadows.map(|it| format!("--shadows {}", it.name())),
+            self.photons.map(|it| format!("--photons {}", on_off(it))),
+            self.dof.map(|it| format!("--dof {}", on_off(it))),
+            self.view.map(|it| format!("--view {}", it.name())),
+            self.exposure.map(|it| format!("--set render.exposure={it}")),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        if has_orbiter && pose.is_some() {
+            options.push("the camera's position".to_owned());
+        } else if let Some(Pose { position, look_at, up }) = pose {
+            options.extend(
+                [("position", position), ("look_at", look_at), ("up", up)]
+                    .map(|(key, value)| vector(key, value)),
+            );
+        }
+        options.extend(fov.map(|it| format!("--set camera.fov={it}")));
+        options.extend(focus.map(|it| format!("--set camera.focus={it}")));
+        options
+    }
+
+    /// Settings that differ from those before, in words; without a camera that the scene has by now, if `is_camera_written`.
+    pub(crate) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
+        let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
+        let camera = self.camera.is_any().then(|| "moved".to_owned());
+        let name = |name: &str| name.to_owned();
+        let all = [
+            ("shadows", self.shadows != before.shadows, self.shadows.map(|it| name(it.name()))),
+            ("integrator", self.integrator != before.integrator, self.integrator.map(|it| name(it.name()))),
+            ("dof", self.dof != before.dof, self.dof.map(on_off)),
+            ("photons", self.photons != before.photons, self.photons.map(on_off)),
+            ("view", self.view != before.view, self.view.map(|it| name(it.name()))),
+            ("camera", self.camera != before.camera && !(is_camera_written && camera.is_none()), camera),
+            ("exposure", self.exposure != before.exposure, self.exposure.map(signed_stops)),
+        ];
+        let differing = || all.iter().filter(|(_, differs, _)| *differs);
+        let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
+        // Settings that are the scene's own again stand together.
+        let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
+        let back = (!back.is_empty()).then(|| format!("{} reset", listed(&back)));
+        now.chain(back).collect()
+    }
+}
+
+/// Names in a sentence: `a`, `a and b`, `a, b and c`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => names.concat(),
+    }
+}
+
+/// Scene and settings that a picture was made of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Origin {
+    /// Settings that keys had changed.
+    pub toggles: Toggles,
+    /// Text of the scene file. `None` for a model.
+    pub text: Option<Arc<str>>,
+    /// The other files of the scene.
+    pub files: Arc<[FileRead]>,
+    /// Whether its render was not over.
+    pub is_unfinished: bool,
+}
+
+impl Origin {
+    /// The same in any exposure: of the same light.
+    pub(crate) fn of_light(self) -> Self {
+        Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
+    }
+
+    /// Origin of an image that a later request has as well: what has changed since had no part in it. But a camera that keys had
+    /// moved, and that the scene has by now, is the scene's.
+    pub(crate) fn of_same_image(&self, later: Self) -> Self {
+        if self.toggles.camera.is_any() && !later.toggles.camera.is_any() {
+            return later;
+        }
+        Self { is_unfinished: later.is_unfinished, ..self.clone() }
+    }
+
+    /// Changes of the files since another one, in words.
+    pub(crate) fn edits(&self, before: &Self) -> Vec<String> {
+        let texts = before.text.as_deref().zip(self.text.as_deref());
+        let of_text = texts.map(|(old, new)| changes(old, new)).unwrap_or_default();
+        let is_changed = |file: &&FileRead| {
+            before.files.iter().any(|old| old.path == file.path && old.content != file.content)
+        };
+        let name = |file: &FileRead| file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let of_files =
+            self.files.iter().filter(is_changed).map(|file| format!("{} changed", visible(&name(file))));
+        of_text.into_iter().chain(of_files).collect()
+    }
+}
+
+/// Stops of exposure, with their sign.
+pub(crate) fn signed_stops(stops: f32) -> String {
+    match stops {
+        0.0 => "0".to_owned(),
+        stops if stops < 0.0 => format!("−{}", -stops),
+        stops => format!("+{stops}"),
+    }
+}
+
+/// A step of the camera. Steps come faster than pictures: the newest step waits until the step before has its first picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct CameraStep {
+    /// Generation of the step's request.
+    pub generation: Option<u64>,
+    /// Whether there is a newer step.
+    pub is_waiting: bool,
+}
+
+/// The newest request: scene, settings, and what the worker found out about them.
+pub(crate) struct RequestState {
+    pub scene: PathBuf,
+    /// Overrides of the command line.
+    pub command_line: Overrides,
+    pub toggles: Toggles,
+
+    /// Number of the newest request.
+    pub generation: u64,
+    /// Toggles of the newest request.
+    pub sent_toggles: Toggles,
+    /// Whether the newest request differs from the one before in its exposure alone.
+    pub is_exposure_only: bool,
+    /// Preview size of the newest request.
+    pub preview_size: Option<PreviewSize>,
+    /// Time at which another preview size is requested.
+    pub resize_due: Option<Instant>,
+    /// Part of the image that is rendered before the rest.
+    pub first_section: Option<Section>,
+    pub camera_step: CameraStep,
+    /// First request of a camera that keys have moved.
+    pub moved_since: Option<u64>,
+    /// Parts of the camera that keys have changed, as the scene had them when a key first changed them.
+    pub moved_from: CameraChange,
+
+    /// Text of the scene file, in the newest request that was understood.
+    pub text: Option<Arc<str>>,
+    /// The other files of the scene.
+    pub files: Arc<[FileRead]>,
+    /// Settings that hold, as the worker reports them.
+    pub effective: Option<Effective>,
+    /// The scene's own camera, in the newest request that was understood.
+    pub camera: Option<Viewpoint>,
+    /// The scene's own exposure, in stops.
+    pub exposure: Option<f32>,
+    /// The scene's other settings that keys change.
+    pub own: Option<OwnSettings>,
+}
+
+impl RequestState {
+    pub(super) fn new(scene: PathBuf, command_line: Overrides) -> Self {
+        Self {
+            scene,
+            command_line,
+            toggles: Toggles::default(),
+            generation: 0,
+            sent_toggles: Toggles::default(),
+            is_exposure_only: false,
+            preview_size: None,
+            resize_due: None,
+            first_section: None,
+            camera_step: CameraStep::default(),
+            moved_since: None,
+            moved_from: CameraChange::default(),
+            text: None,
+            files: Arc::default(),
+            effective: None,
+            camera: None,
+            exposure: None,
+            own: None,
+        }
+    }
+
+    /// Notes the files that the newest request is made of. The text of a scene is compared by itself; a model has none.
+    pub(crate) fn note_files(&mut self, files: Vec<FileRead>) {
+        let is_model = is_mesh(&self.scene);
+        self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
+    }
+
+    /// Description of what the newest request shows.
+    pub(crate) fn origin(&self, is_unfinished: bool) -> Origin {
+        Origin {
+            toggles: self.sent_toggles,
+            text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
+            files: self.files.clone(),
+            is_unfinished,
+        }
+    }
+
+    /// The scene's settings as the command line and the keys change them.
+    pub(crate) fn overrides(&self) -> Overrides {
+        let mut overrides = self.command_line.clone();
+        overrides.shadows = self.toggles.shadows.or(overrides.shadows);
+        overrides.integrator = self.toggles.integrator.or(overrides.integrator);
+        overrides.dof = self.toggles.dof.or(overrides.dof);
+        overrides.photons = self.toggles.photons.or(overrides.photons);
+        overrides.view = self.toggles.view.or(overrides.view);
+        overrides.camera = self.toggles.camera;
+        overrides.exposure = self.toggles.exposure.or(overrides.exposure);
+        overrides
+    }
+
+    /// Overrides of the scene's own image, if keys show something else.
+    pub(crate) fn own_overrides(&self) -> Option<Box<Overrides>> {
+        (!self.is_own()).then(|| Box::new(self.command_line.clone()))
+    }
+
+    /// Drops changes by keys that the scene has by now, after a save.
+    pub(crate) fn drop_saved_changes(&mut self) {
+        let (shadows, integrator, photons) =
+            (self.base_shadows(), self.base_integrator(), self.base_photons());
+        let (exposure, own) = (self.command_line.exposure.or(self.exposure), self.camera);
+        let Toggles { camera, .. } = &mut self.toggles;
+        camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
+        camera.fov.take_if(|fov| own.is_some_and(|own| own.fov == *fov));
+        self.toggles.shadows.take_if(|now| Some(*now) == shadows);
+        self.toggles.integrator.take_if(|now| Some(*now) == integrator);
+        self.toggles.photons.take_if(|now| Some(*now) == photons);
+        self.toggles.exposure.take_if(|now| Some(*now) == exposure);
+    }
+
+    /// The camera as the keys have it. `None` until a scene has been understood.
+    pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
+        self.camera.map(|camera| camera.changed(&self.toggles.camera))
+    }
+
+    /// Notes the scene's own camera, in the parts that keys have changed. Parts that were noted before stay as they are.
+    pub(crate) fn note_moved_parts(&mut self) {
+        let Some(own) = self.camera else { return };
+        let (moved, from) = (&self.toggles.camera, self.moved_from);
+        self.moved_from = CameraChange {
+            pose: moved.pose.and(from.pose.or(Some(own.pose))),
+            fov: moved.fov.and(from.fov.or(Some(own.fov))),
+            focus: moved.focus.and(from.focus.or(Some(own.focus))),
+        };
+    }
+
+    /// Takes the scene's own camera for the one that keys have moved.
+    pub(crate) fn move_from_own(&mut self) {
+        self.moved_from = CameraChange::default();
+        self.note_moved_parts();
+    }
+
+    /// Keys of the camera that were saved since keys moved them, with the values that the scene has now.
+    pub(crate) fn saved_since_moved(&self) -> Vec<String> {
+        let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
+        let from = &self.moved_from;
+        let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
+            let (before, now) = (of(&from.pose?), of(&own.pose));
+            let DVec3 { x, y, z } = now;
+            (before != now && now != of(&moved.pose)).then(|| format!("camera.{key} = [{x}, {y}, {z}]"))
+        };
+        let of_number = |key: &str, before: Option<f64>, now: f64, moved: f64| {
+            let is_saved = before.is_some_and(|before| before != now) && now != moved;
+            is_saved.then(|| format!("camera.{key} = {now}"))
+        };
+        // A plane in focus that goes through `look_at` moves with the camera.
+        let focus = from.focus.filter(|_| !own.is_focused_on_look_at());
+        let all = [
+            of_pose("position", |pose| pose.position),
+            of_pose("look_at", |pose| pose.look_at),
+            of_pose("up", |pose| pose.up),
+            of_number("fov", from.fov, own.fov, moved.fov),
+            of_number("focus", focus, own.focus, moved.focus),
+        ];
+        all.into_iter().flatten().collect()
+    }
+
+    /// Changes by keys that the picture alone does not show, in words.
+    pub(crate) fn changes(&self) -> Vec<String> {
+        let CameraChange { pose, fov, focus } = self.toggles.camera;
+        let is_moved = pose.is_some() || fov.is_some();
+        let moved = is_moved.then(|| "camera".to_owned());
+        let focused = (focus.is_some() && !is_moved).then(|| "focus".to_owned());
+        let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", signed_stops(it)));
+        moved.into_iter().chain(focused).chain(exposed).collect()
+    }
+
+    /// Whether this is the scene's own image, the only one that is written without a key: keys change nothing of it.
+    pub(crate) fn is_own(&self) -> bool {
+        self.toggles == Toggles::default()
+    }
+
+    /// The view that the run was started with.
+    pub(crate) fn base_view(&self) -> View {
+        self.command_line.view.unwrap_or(View::Beauty)
+    }
+
+    pub(crate) fn view(&self) -> View {
+        self.toggles.view.unwrap_or_else(|| self.base_view())
+    }
+
+    /// The shadows of the scene with the command line. `None` until a scene has been understood.
+    pub(crate) fn base_shadows(&self) -> Option<Shadows> {
+        self.command_line.shadows.or(self.own.map(|own| own.shadows))
+    }
+
+    /// The shadows that hold now.
+    pub(crate) fn shadows(&self) -> Shadows {
+        self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
+    }
+
+    /// Whether the scene with the command line has photons. `None` until a scene has been understood.
+    pub(crate) fn base_photons(&self) -> Option<bool> {
+        self.command_line.photons.or(self.own.map(|own| own.photons))
+    }
+
+    /// Whether photons are on now.
+    pub(crate) fn photons(&self) -> bool {
+        self.toggles.photons.or(self.base_photons()).unwrap_or(false)
+    }
+
+    /// The integrator of the scene with the command line. `None` until a scene has been understood.
+    pub(crate) fn base_integrator(&self) -> Option<Integrator> {
+        self.command_line.integrator.or(self.own.map(|own| own.integrator))
+    }
+
+    /// The integrator that holds now.
+    pub(crate) fn integrator(&self) -> Integrator {
+        self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
+    }
+
+    /// Aspect ratio of the image; a usual one until it is known.
+    pub(crate) fn aspect(&self) -> f32 {
+        const USUAL: f32 = 4.0 / 3.0;
+        self.effective
+            .as_ref()
+            .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
+            .clamp(0.02, 50.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposure_has_the_minus_of_all_numbers() {
+        assert_eq!([-0.25, 0.0, 1.5].map(signed_stops), ["−0.25", "0", "+1.5"]);
+    }
+}

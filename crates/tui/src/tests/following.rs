@@ -1,0 +1,412 @@
+//! Tests of the screen during a render, on a quick terminal and on a slow line, with simulated time.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::super::display::{Display, Way};
+use super::super::graphics::{Images, PixelScreen, Protocol};
+use super::super::known::Answer;
+use super::super::presenter::Presenter;
+use crate::color::{ColorDepth, in_xterm};
+use crate::event::Event;
+use crate::film::Picture;
+use crate::fixtures::*;
+use crate::mosaic::filled;
+use crate::pipeline::protocol::{self, LatestPreview, PreviewSlot};
+use crate::pipeline::settings::Overrides;
+use crate::preview_kind::PreviewKind;
+
+const COLUMNS: u16 = 120;
+const ROWS: u16 = 40;
+/// Seconds of the render.
+const SECONDS: f64 = 10.0;
+const SAMPLES: f64 = 256.0;
+/// Between two pictures of the worker, and between two of its words.
+const PICTURE: Duration = Duration::from_millis(66);
+const PROGRESS: Duration = Duration::from_millis(60);
+
+/// A line with a terminal at its end.
+#[derive(Clone, Copy)]
+struct Line {
+    bytes_per_second: f64,
+    round_trip: Duration,
+}
+
+const QUICK: Line = Line { bytes_per_second: 2e7, round_trip: Duration::from_millis(1) };
+/// 1 Mbit/s.
+const THIN: Line = Line { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
+
+/// The terminal: what is on its screen, and its answers under way.
+struct Terminal {
+    line: Line,
+    /// When the last byte leaves the line.
+    free: Instant,
+    arriving: VecDeque<(Instant, Vec<u8>)>,
+    answers: VecDeque<(Instant, Answer)>,
+    cells: vt100::Parser,
+    pixels: PixelScreen,
+    /// Bytes that came, and their number.
+    bytes: Vec<u8>,
+    sent: usize,
+    /// Bytes in the line or unanswered, and the most of them.
+    unanswered: VecDeque<(Instant, usize)>,
+    most_unanswered: usize,
+}
+
+impl Terminal {
+    fn new(line: Line, now: Instant) -> Self {
+        let side = |length| std::num::NonZero::new(length).expect("not zero");
+        Self {
+            line,
+            free: now,
+            arriving: VecDeque::new(),
+            answers: VecDeque::new(),
+            cells: vt100::Parser::new(side(ROWS), side(COLUMNS), 0),
+            pixels: PixelScreen::default(),
+            bytes: Vec::new(),
+            sent: 0,
+            unanswered: VecDeque::new(),
+            most_unanswered: 0,
+        }
+    }
+
+    /// A slice goes into the line. Each of them ends with a question.
+    fn send(&mut self, bytes: Vec<u8>, now: Instant) {
+        let Line { bytes_per_second, round_trip } = self.line;
+        let answer = if bytes.ends_with(b"\x1b[c") { Answer::Attributes } else { Answer::Ready };
+        self.free = self.free.max(now) + Duration::from_secs_f64(bytes.len() as f64 / bytes_per_second);
+        self.answers.push_back((self.free + round_trip, answer));
+        self.sent += bytes.len();
+        self.unanswered.push_back((self.free + round_trip, bytes.len()));
+        let unanswered = self.unanswered.iter().map(|(_, bytes)| bytes).sum();
+        self.most_unanswered = self.most_unanswered.max(unanswered);
+        self.arriving.push_back((self.free + round_trip / 2, bytes));
+    }
+
+    /// Shows what has arrived.
+    fn pass(&mut self, now: Instant) {
+        while let Some((_, bytes)) = self.arriving.pop_front_if(|(when, _)| *when <= now) {
+            self.cells.process(&bytes);
+            self.pixels.take(&bytes);
+            self.bytes.extend(bytes);
+        }
+        while self.unanswered.pop_front_if(|(when, _)| *when <= now).is_some() {}
+    }
+
+    fn next(&self) -> Option<Instant> {
+        let arriving = self.arriving.front().map(|(when, _)| *when);
+        arriving.into_iter().chain(self.answers.front().map(|(when, _)| *when)).min()
+    }
+
+    /// The colours of the parts of all cells, or of the pixels.
+    fn seen(&self) -> Vec<[u8; 3]> {
+        if let Some(picture) = self.pixels.shown() {
+            return picture.pixels.clone();
+        }
+        let mut colors = Vec::new();
+        for row in 1..ROWS - 3 {
+            for column in 0..COLUMNS - 30 {
+                let cell = self.cells.screen().cell(row, column).expect("a cell");
+                colors.extend(parts(cell).into_iter().flatten());
+            }
+        }
+        colors
+    }
+}
+
+/// The colours of the parts of a cell of blocks; `None`: it has other characters, or the terminal's own colours.
+fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
+    let color = |color| match color {
+        vt100::Color::Default => None,
+        vt100::Color::Idx(index) => in_xterm(ratatui::style::Color::Indexed(index)),
+        vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
+    };
+    let filled = filled(cell.contents().chars().next().unwrap_or(' '))?;
+    let (fg, bg) = (color(cell.fgcolor()), color(cell.bgcolor()));
+    let part = |is_ink: bool| if is_ink { fg } else { bg };
+    let parts = filled.map(part);
+    parts.iter().all(Option::is_some).then(|| parts.map(Option::unwrap_or_default))
+}
+
+/// A render that somebody watches.
+struct Watch {
+    desk: Desk,
+    presenter: Presenter,
+    outbox: Rc<RefCell<Vec<Vec<u8>>>>,
+    terminal: Terminal,
+    slot: PreviewSlot,
+    begin: Instant,
+    size: (u32, u32),
+    /// When the worker says how far it is, and has a picture.
+    next: [Instant; 2],
+    /// Pictures that were drawn.
+    shown: usize,
+    /// Steps of the camera.
+    turn: u32,
+}
+
+impl Watch {
+    fn new(line: Line, preview: PreviewKind, depth: ColorDepth) -> Self {
+        let mut desk = Desk::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
+        let begin = desk.now;
+        let generation = desk.state.request.generation;
+        desk.worker(protocol::Event::Started { generation });
+        let settings = Box::new(settings());
+        desk.worker(protocol::Event::Settings {
+            generation,
+            settings,
+            camera: camera(),
+            exposure: 0.0,
+            own: own(),
+        });
+        let size = desk.state.request.preview_size.expect("previews are asked for");
+        let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
+        let images = match preview {
+            PreviewKind::Pixels(protocol) => Some(Images::new(protocol, false)),
+            _ => None,
+        };
+        let taken = Rc::clone(&outbox);
+        let out = Box::new(move |bytes| taken.borrow_mut().push(bytes));
+        let display = Display::new(depth, Way::default(), images, out, begin);
+        Self {
+            presenter: Presenter::new(display, slot.clone(), begin),
+            desk,
+            outbox,
+            terminal: Terminal::new(line, begin),
+            slot,
+            begin,
+            size: (size.width, size.height),
+            next: [begin; 2],
+            shown: 0,
+            turn: 0,
+        }
+    }
+
+    /// Goes on until so much of the render is done.
+    fn until(&mut self, fraction: f64) {
+        let end = self.begin + Duration::from_secs_f64(SECONDS * fraction);
+        self.go_on(end, true);
+    }
+
+    /// Holds a key on the camera for so long: the worker has a first picture of each step soon after its request.
+    fn orbit(&mut self, time: Duration) {
+        const REPEAT: Duration = Duration::from_millis(33);
+        const FIRST: Duration = Duration::from_millis(12);
+        let end = self.desk.now + time;
+        let (mut key, mut last) = (self.desk.now, self.desk.state.request.generation);
+        // The last step of a key that was held before may have no picture yet.
+        let mut asked = Some(self.desk.now);
+        while self.desk.now < end {
+            let next = asked.map_or(key, |asked: Instant| key.min(asked + FIRST));
+            self.go_on(next, false);
+            if asked.is_some_and(|asked| self.desk.now >= asked + FIRST) {
+                asked = None;
+                self.turn += 1;
+                self.put_picture(1.0);
+            }
+            if self.desk.now >= key {
+                key += REPEAT;
+                self.desk.press('l');
+            }
+            // A step that waited is requested when the step before has its picture.
+            if self.desk.state.request.generation > last {
+                (asked, last) = (Some(self.desk.now), self.desk.state.request.generation);
+            }
+        }
+    }
+
+    /// The last picture, until all of it has arrived.
+    fn finish(&mut self) {
+        let generation = self.desk.state.request.generation;
+        self.put_picture(SAMPLES);
+        self.desk.worker(done(generation, Vec::new(), false));
+        self.go_on(self.desk.now + Duration::from_secs(5), false);
+    }
+
+    fn go_on(&mut self, end: Instant, is_at_work: bool) {
+        loop {
+            let now = self.desk.now;
+            self.presenter.draw_if_due(&mut self.desk.state, now);
+            for event in self.presenter.pump(&self.desk.state, now, || false) {
+                self.happen(event);
+            }
+            for bytes in std::mem::take(&mut *self.outbox.borrow_mut()) {
+                self.presenter.display.written(bytes.len());
+                self.terminal.send(bytes, now);
+            }
+            let wake = self.presenter.wake(&self.desk.state, now);
+            let work = self.next.into_iter().filter(|_| is_at_work).min();
+            let next = [wake, work, self.terminal.next()].into_iter().flatten().min().unwrap_or(end);
+            if next >= end {
+                self.desk.now = end;
+                self.terminal.pass(end);
+                return;
+            }
+            self.desk.now = next.max(now);
+            self.events(is_at_work);
+        }
+    }
+
+    /// Events by now.
+    fn events(&mut self, is_at_work: bool) {
+        let now = self.desk.now;
+        self.terminal.pass(now);
+        while let Some((_, answer)) = self.terminal.answers.pop_front_if(|(when, _)| *when <= now) {
+            self.presenter.display.answered(answer, now);
+        }
+        let done = (now - self.begin).as_secs_f64() / SECONDS;
+        let generation = self.desk.state.request.generation;
+        if is_at_work && now >= self.next[0] {
+            self.next[0] = now + PROGRESS;
+            let progress = progress(done, Some((1.0 - done) * SECONDS));
+            let progress = protocol::RenderProgress {
+                samples: (done * SAMPLES) as u32,
+                mean_samples: done * SAMPLES,
+                total_samples: SAMPLES as u32,
+                ..progress
+            };
+            self.desk.worker(protocol::Event::Progress { generation, progress });
+        }
+        if is_at_work && now >= self.next[1] {
+            self.next[1] = now + PICTURE;
+            self.put_picture((done * SAMPLES).max(1.0));
+        }
+        self.desk.event(Event::Tick);
+    }
+
+    fn put_picture(&mut self, samples: f64) {
+        let generation = self.desk.state.request.generation;
+        let picture = Arc::new(picture(self.size, samples, self.turn));
+        *self.slot.lock().expect("whole") = Some(LatestPreview {
+            generation,
+            picture,
+            range: None,
+            section: None,
+            lacks_photons: false,
+            source: None,
+        });
+        if let Some(event) = self.presenter.preview(generation, &self.desk.state, self.desk.now) {
+            self.happen(event);
+        }
+    }
+
+    fn happen(&mut self, event: Event) {
+        self.shown += usize::from(matches!(event, Event::Shown { .. }));
+        self.desk.event(event);
+    }
+}
+
+/// A room of soft colours, seen from a place, with the noise of so many samples.
+fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
+    /// Codes, of one sample: about that of a Cornell box.
+    const NOISE: f64 = 1.2;
+    let pixel = |i: u32| {
+        let column = (i % width + 3 * turn) % width;
+        let (x, y) = (f64::from(column) / f64::from(width), f64::from(i / width) / f64::from(height));
+        let wall = if x < 0.3 { [150.0, 40.0, 30.0] } else { [130.0, 120.0, 100.0] };
+        let hash = (u64::from(i) << 20 ^ samples.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let channel = |c: usize| {
+            let unit = f64::from((hash >> (16 * c) & 0xFFFF) as u16) / 65536.0 - 0.5;
+            // Of a mean distance of a quarter of the width.
+            wall[c] * (0.4 + 0.6 * y) + NOISE * 4.0 * unit / samples.sqrt()
+        };
+        std::array::from_fn(|c| channel(c).round() as u8)
+    };
+    Picture { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+/// The mean distance of two screens, in codes of 255.
+fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
+    assert!(!b.is_empty() && a.len() == b.len(), "{} and {} parts", a.len(), b.len());
+    let all = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(a.abs_diff(*b)));
+    all.sum::<f64>() / (3 * a.len()) as f64
+}
+
+/// Codes that the screen may be off the final one at 10, 25 and 50 % of a render.
+const MOST: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
+
+/// Checks that the screen is near the final one at each fraction of [`MOST`], and that there are enough pictures.
+#[track_caller]
+fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
+    let mut watch = Watch::new(QUICK, preview, depth);
+    let screens = MOST.map(|(fraction, _)| {
+        watch.until(fraction);
+        watch.terminal.seen()
+    });
+    watch.until(1.0);
+    let pictures = watch.shown;
+    watch.finish();
+    for ((fraction, most), screen) in MOST.into_iter().zip(&screens) {
+        let apart = apart(screen, &watch.terminal.seen());
+        assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: {apart} codes");
+    }
+    assert!((45..=105).contains(&pictures), "{preview:?}, {depth:?}: {pictures} in 10 s");
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_half_blocks() {
+    assert_followed(PreviewKind::HalfBlock, ColorDepth::TrueColor);
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_sextants() {
+    assert_followed(PreviewKind::Sextant, ColorDepth::TrueColor);
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_256_colours() {
+    assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_pixels() {
+    assert_followed(PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor);
+}
+
+#[test]
+fn a_thin_line_carries_few_pictures_and_no_queue_of_them() {
+    let mut watch = Watch::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    watch.until(1.0);
+    assert!(watch.shown <= 12, "{} pictures in 10 s", watch.shown);
+    let sent = watch.terminal.sent;
+    assert!(sent <= 300_000, "{sent} bytes");
+    assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
+    let before = watch.terminal.seen();
+    watch.finish();
+    let apart = apart(&before, &watch.terminal.seen());
+    assert!(apart > 0.5 && apart < 4.0, "{apart} codes: the last picture is exact, those before need not be");
+}
+
+#[test]
+fn a_held_key_fills_a_thin_line() {
+    let mut watch = Watch::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    watch.until(0.2);
+    watch.orbit(Duration::from_secs(2));
+    let before = watch.terminal.sent;
+    watch.orbit(Duration::from_secs(6));
+    let used = (watch.terminal.sent - before) as f64 / (6.0 * THIN.bytes_per_second);
+    assert!(used >= 0.7, "{used} of the line");
+    assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
+}
+
+/// kitty 0.26 shows nothing of pictures whose chunks come between the marks of synchronised output.
+#[test]
+fn only_cells_are_sent_between_marks() {
+    let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");
+    for (preview, is_marked) in
+        [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(Protocol::Kitty), false)]
+    {
+        let mut watch = Watch::new(QUICK, preview, ColorDepth::TrueColor);
+        watch.presenter.display.answered(Answer::Synchronized { is_known: true }, watch.begin);
+        watch.until(0.1);
+        let sent = String::from_utf8_lossy(&watch.terminal.bytes).into_owned();
+        let between: Vec<&str> =
+            sent.split(begin).skip(1).filter_map(|rest| rest.split(end).next()).collect();
+        assert!(!is_marked || !between.is_empty(), "large slices of cells have marks");
+        assert!(between.iter().all(|part| !part.contains("\x1b_G")), "{preview:?}");
+        assert_eq!(sent.contains("\x1b_G"), !is_marked, "{preview:?}");
+    }
+}

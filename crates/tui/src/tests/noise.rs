@@ -1,0 +1,97 @@
+//! Tests of the words about noise.
+
+use super::RED;
+use crate::event::Event;
+use crate::fixtures::*;
+use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
+
+#[test]
+fn the_noise_is_told_as_it_falls() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    let noise = Some(NoiseProgress { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
+    let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
+    desk.worker(protocol::Event::Progress { generation: 1, progress });
+    for (columns, rows, words) in [
+        (80, 24, "noise 2.1 %, 1 % in about 14 s · 32/64 samples"),
+        (54, 20, "noise 2.1 % · 32/64 samples"),
+        (36, 20, "32/64 samples"),
+    ] {
+        desk.event(Event::Resize(window(columns, rows)));
+        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+    }
+    assert!(!desk.text().contains("noise"), "{}", desk.text());
+    // A pause has no end that is known.
+    desk.event(Event::Resize(window(80, 24)));
+    desk.press(' ');
+    assert!(desk.text().contains("noise 2.1 % · 32/64 samples"), "{}", desk.text());
+}
+
+#[test]
+fn samples_have_no_total_while_noise_decides_it() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
+    desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings,
+        camera: camera(),
+        exposure: 0.0,
+        own: own(),
+    });
+    desk.worker(protocol::Event::Progress {
+        generation: 1,
+        progress: RenderProgress { is_total_fixed: false, ..progress(0.5, None) },
+    });
+    assert!(desk.text().contains("about 32 samples per pixel"), "{}", desk.text());
+}
+
+/// The end of a render with `error`, or with a budget of time: whether it was complete, and the samples that it had.
+fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
+    let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
+    let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
+    let mut desk = Desk::with(state_with(80, 24, kind, depth, overrides));
+    desk.finish(RED);
+    let report = desk.state.work.report.as_mut().expect("a report");
+    (report.image.complete, report.image.samples.max) = (complete, samples);
+    desk.state.request.effective.as_mut().expect("settings").error = error;
+    desk.text()
+}
+
+#[test]
+fn what_ended_a_render_is_told_if_several_things_could() {
+    for (error, time, complete, samples, words) in [
+        (0.02, None, true, 40, "2 % a tile ✓"),
+        (0.02, None, true, 64, "ended by samples"),
+        (0.02, Some(5.0), false, 40, "ended by time"),
+        (0.0, Some(5.0), false, 40, "ended by time"),
+        (0.0, Some(5.0), true, 64, "ended by samples"),
+    ] {
+        let text = ended(error, time, complete, samples).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(words), "{words}: {text}");
+        assert_eq!(text.contains("✓ ") && text.contains("tile ✓"), words.contains("✓"), "{text}");
+        assert_eq!(text.contains("ended by"), words.contains("ended"), "{text}");
+    }
+    let plain = ended(0.0, None, true, 64);
+    assert!(!plain.contains("ended"), "{plain}");
+}
+
+#[test]
+fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    assert!(desk.text().contains("0.81 % in all") && !desk.text().contains("a tile"), "{}", desk.text());
+    for (samples, words) in [(64, "0.5 % a tile "), (256, "0.5 % a tile ✓")] {
+        desk.state.request.effective.as_mut().expect("settings").error = 0.005;
+        desk.state.request.effective.as_mut().expect("settings").samples = samples;
+        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+    }
+}
+
+#[test]
+fn noise_has_two_digits() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
+    assert!(desk.text().contains("43 % in all"), "{}", desk.text());
+}

@@ -1,0 +1,239 @@
+//! Effects of keys on the state.
+
+use crossterm::event::{KeyCode, KeyModifiers};
+
+use super::request::{render, resized_preview};
+use super::say::{notify, say};
+use super::views::choose_view;
+use super::{camera, history, overlay, places, pointer, rectangle};
+use crate::ExitStatus;
+use crate::action::Action;
+use crate::choice::Choice;
+use crate::event::{Effect, KeyPress};
+use crate::keymap;
+use crate::pipeline::protocol::Command;
+use crate::pipeline::settings::View;
+use crate::preview_kind::PreviewKind;
+use crate::scene::description::{Integrator, Method, Shadows};
+use crate::scene::is_mesh;
+use crate::state::{Pane, State, Toggles};
+
+pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
+    if let Some(effects) = overlay::update(state, key) {
+        return effects;
+    }
+    let Some(action) = keymap::action(key) else {
+        let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
+            && matches!(key.code, KeyCode::Char('1'..='9'));
+        return if is_digit {
+            notify(state, "v lists the views; a digit chooses one of the list")
+        } else {
+            Vec::new()
+        };
+    };
+    state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
+    state.selection.is_focusing &= action == Action::Focus;
+    if action != Action::RectangleFirst {
+        rectangle::leave(state);
+    }
+    act(state, action)
+}
+
+pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
+    match action {
+        Action::CycleShadows => cycle_shadows(state),
+        Action::ToggleDepthOfField => toggle_depth_of_field(state),
+        Action::TogglePhotons => toggle_photons(state),
+        Action::CycleIntegrator => cycle_integrator(state),
+        Action::NextView => step_view(state, 1),
+        Action::PreviousView => step_view(state, View::ALL.len() - 1),
+        Action::TogglePause => toggle_pause(state),
+        Action::RenderAgain => render(state, true),
+        Action::WriteNow => write_now(state),
+        Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
+        Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
+        Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
+        Action::OrbitDown => camera::orbit(state, 0.0, -1.0),
+        Action::DollyIn => camera::dolly(state, 1.0),
+        Action::DollyOut => camera::dolly(state, -1.0),
+        Action::NarrowField => camera::zoom(state, -1.0),
+        Action::WidenField => camera::zoom(state, 1.0),
+        Action::Darken => camera::expose(state, -1.0),
+        Action::Brighten => camera::expose(state, 1.0),
+        Action::KeepCamera => camera::keep(state),
+        Action::UndoCamera => camera::undo(state),
+        Action::Inspect => pointer::inspect(state),
+        Action::Copy => pointer::copy(state),
+        Action::Focus => pointer::focus(state),
+        Action::CloseUp => close_up(state),
+        Action::RectangleFirst => rectangle::press(state),
+        Action::ToggleMouse => pointer::toggle_mouse(state),
+        Action::Edit if is_mesh(&state.request.scene) => {
+            notify(state, "the editor opens scenes, and this is a model; c writes a scene of it")
+        }
+        Action::Edit => vec![Effect::Edit(places::to_edit(state))],
+        Action::BeforeAfter => history::before_and_after(state),
+        Action::OlderPicture => history::browse(state, 1),
+        Action::NewerPicture => history::browse(state, -1),
+        Action::SceneSettings => scene_settings(state),
+        Action::ToggleDiagnostics => toggle_diagnostics(state),
+        Action::ToggleHelp => change(state, |state| {
+            state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
+        }),
+        Action::PictureAlone => picture_alone(state),
+        Action::Redraw => vec![Effect::Redraw],
+        Action::Suspend => vec![Effect::StopJob],
+        Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
+        Action::Quit => vec![Effect::Quit(ExitStatus::QUIT)],
+    }
+}
+
+fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
+    how(state);
+    state.dirty = true;
+    Vec::new()
+}
+
+/// Whether a setting differs from the one without keys.
+fn is_change<T: PartialEq>(next: &T, base: Option<T>) -> bool {
+    base.is_none_or(|base| *next != base)
+}
+
+fn cycle_integrator(state: &mut State) -> Vec<Effect> {
+    let (all, own) = (Integrator::ALL, state.request.integrator());
+    let next = all.iter().skip_while(|one| **one != own).nth(1).or(all.first());
+    state.request.toggles.integrator =
+        next.copied().filter(|next| is_change(next, state.request.base_integrator()));
+    render(state, false)
+}
+
+/// Message that the integrator does not honour a setting, with another one that does. `None` if it honours the setting.
+fn refused(state: &State, honours: impl Fn(Method) -> bool, what: &str) -> Option<String> {
+    let own = state.request.integrator();
+    if honours(own.method()) {
+        return None;
+    }
+    let other = Integrator::ALL.iter().find(|one| honours(one.method()))?;
+    Some(format!("{} {what}; press i for {}", own.name(), other.name()))
+}
+
+fn cycle_shadows(state: &mut State) -> Vec<Effect> {
+    if let Some(refused) = refused(state, |method| method.honours_shadows, "ignores `shadows`") {
+        return notify(state, &refused);
+    }
+    let next = match state.request.shadows() {
+        Shadows::Soft => Shadows::Hard,
+        Shadows::Hard => Shadows::Off,
+        Shadows::Off => Shadows::Soft,
+    };
+    state.request.toggles.shadows = Some(next).filter(|next| is_change(next, state.request.base_shadows()));
+    render(state, false)
+}
+
+/// A scene whose depth of field is off although nothing switched it off has a pinhole for a lens.
+fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
+    let switched_off = state.request.overrides().dof == Some(false);
+    match &state.request.effective {
+        None => return notify(state, "the scene has not been read yet"),
+        Some(effective) if !effective.dof && !switched_off => {
+            return notify(state, "no depth of field: the camera's `aperture` is 0");
+        }
+        Some(_) => {}
+    }
+    // Where nothing switches it off, the lens decides.
+    let base = state.request.command_line.dof.or(Some(true));
+    state.request.toggles.dof = Some(switched_off).filter(|next| is_change(next, base));
+    render(state, false)
+}
+
+fn toggle_photons(state: &mut State) -> Vec<Effect> {
+    if let Some(refused) = refused(state, |method| method.gathers, "gathers no photons") {
+        return notify(state, &refused);
+    }
+    let next = !state.request.photons();
+    state.request.toggles.photons = Some(next).filter(|next| is_change(next, state.request.base_photons()));
+    render(state, false)
+}
+
+fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
+    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+    choose_view(state, View::ALL[(current + steps) % View::ALL.len()])
+}
+
+fn picture_alone(state: &mut State) -> Vec<Effect> {
+    match state.display.kind {
+        PreviewKind::None => return notify(state, "no picture is shown: see --preview"),
+        PreviewKind::HalfBlock
+        | PreviewKind::Quadrant
+        | PreviewKind::Sextant
+        | PreviewKind::Octant
+        | PreviewKind::Ascii
+        | PreviewKind::Pixels(_) => {}
+    }
+    state.picture.is_alone = !state.picture.is_alone;
+    state.dirty = true;
+    resized_preview(state)
+}
+
+/// The picture's own pixels around the crosshair, or all of it again.
+fn close_up(state: &mut State) -> Vec<Effect> {
+    if state.request.preview_size.is_none() {
+        return notify(state, "no picture is shown: see --preview");
+    }
+    history::close(state, "");
+    state.picture.close_up =
+        if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
+    match state.picture.close_up {
+        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x goes back"),
+        None => state.overlays.message = None,
+    }
+    state.dirty = true;
+    resized_preview(state)
+}
+
+fn toggle_pause(state: &mut State) -> Vec<Effect> {
+    if !state.work.is_running() && !state.work.paused {
+        return notify(state, "nothing is rendering");
+    }
+    state.set_paused(!state.work.paused);
+    state.dirty = true;
+    vec![Effect::Send(Command::Pause(state.work.paused))]
+}
+
+fn write_now(state: &mut State) -> Vec<Effect> {
+    let is_open = state.picture.history.is_open();
+    say(
+        state,
+        if is_open {
+            "writing the newest image, not the one that is shown"
+        } else {
+            "writing the image as it is now"
+        },
+    );
+    (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
+    vec![Effect::Send(Command::Write)]
+}
+
+fn scene_settings(state: &mut State) -> Vec<Effect> {
+    if state.request.toggles == Toggles::default() {
+        return notify(state, "nothing to reset");
+    }
+    state.request.toggles = Toggles::default();
+    let effects = render(state, false);
+    say(state, "reset to the scene's settings");
+    effects
+}
+
+fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
+    if state.overlays.problems.is_none() && state.reported().is_empty() {
+        let is_read = state.overlays.are_warnings_known || !state.work.is_running();
+        return notify(
+            state,
+            if is_read { "no errors and no warnings" } else { "the files are still being read" },
+        );
+    }
+    change(state, |state| {
+        state.overlays.diagnostics.open = !state.overlays.diagnostics.open;
+        state.overlays.diagnostics.scroll = 0;
+    })
+}

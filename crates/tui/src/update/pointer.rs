@@ -1,0 +1,276 @@
+//! The mouse on the picture, and questions about a place there.
+
+use super::say::{notify, prompt, say};
+use super::{camera, history, overlay, rectangle};
+use crate::chrome;
+use crate::event::FilePlace;
+use crate::event::{Effect, Mouse, MouseKind};
+use crate::keymap::Overlay;
+use crate::math::decimal::{decimal_step, rounded};
+use crate::pipeline::protocol::{Command, Picked, Thing};
+use crate::scene::is_mesh;
+use crate::scene::sanitize::visible;
+use crate::state::{PickPurpose, Press, State};
+use crate::view;
+use crate::view::layout::Layout;
+use crate::view::preview::spot_at;
+
+/// Degrees that a drag over the width of the picture's area turns by.
+const TURN_ACROSS: f64 = 180.0;
+
+const OLDER: &str = "of an older picture nothing is known but its pixels: b shows the newest one";
+const IN_FOCUS: &str = "everything is in focus: the camera's `aperture` is 0";
+
+/// Reacts to the mouse.
+pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    match mouse.kind {
+        MouseKind::Press => {
+            let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
+            let Mouse { column, row, .. } = mouse;
+            if let Some(at) = view::picture_at(state, column, row) {
+                return history::open_at(state, at);
+            }
+            let from = spot_at(state, column, row);
+            state.selection.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
+            Vec::new()
+        }
+        MouseKind::Drag => drag(state, mouse),
+        MouseKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
+            let spot = spot_at(state, mouse.column, mouse.row);
+            rectangle::release(state, spot)
+        }
+        MouseKind::Release => match state.selection.press.take() {
+            Some(press) if !press.has_moved => click(state, mouse),
+            Some(_) | None => Vec::new(),
+        },
+        MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => {
+            let line = if mouse.kind == MouseKind::WheelUp { Overlay::LineUp } else { Overlay::LineDown };
+            overlay::act(state, line);
+            Vec::new()
+        }
+        MouseKind::WheelUp => camera::dolly(state, 1.0),
+        MouseKind::WheelDown => camera::dolly(state, -1.0),
+    }
+}
+
+fn is_on_pane(state: &State, mouse: Mouse) -> bool {
+    let is_on_errors = || Layout::of(state).pane.contains((mouse.column, mouse.row).into());
+    state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
+}
+
+/// The scene turns with the hand.
+fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    let Some(press) = state.selection.press else { return Vec::new() };
+    if state.selection.is_marking {
+        if let Some((from, to)) = press.from.zip(spot_at(state, mouse.column, mouse.row)) {
+            rectangle::drag(state, from, to);
+        }
+        return Vec::new();
+    }
+    let cells = |now: u16, before: u16| f64::from(now) - f64::from(before);
+    let (right, down) = (cells(mouse.column, press.column), cells(mouse.row, press.row));
+    if right == 0.0 && down == 0.0 {
+        return Vec::new();
+    }
+    state.selection.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true, ..press });
+    let degrees = TURN_ACROSS / f64::from(Layout::of(state).preview.width.max(1));
+    camera::turn(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
+}
+
+fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
+    let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
+    state.selection.crosshair = spot;
+    let purpose = if std::mem::take(&mut state.selection.is_focusing) {
+        PickPurpose::Focus
+    } else {
+        PickPurpose::Inspect
+    };
+    ask(state, purpose)
+}
+
+/// Asks for the object at the crosshair.
+pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
+    ask(state, PickPurpose::Inspect)
+}
+
+/// First it waits for a click; asked again it takes the crosshair.
+pub(super) fn focus(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
+    if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
+        state.selection.is_focusing = false;
+        return notify(state, IN_FOCUS);
+    }
+    if state.selection.is_mouse_on && !state.selection.is_focusing {
+        state.selection.is_focusing = true;
+        return prompt(
+            state,
+            "click where to focus; f again focuses at the crosshair: the last click, else the middle",
+        );
+    }
+    state.selection.is_focusing = false;
+    ask(state, PickPurpose::Focus)
+}
+
+fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
+    if state.request.camera.is_none() {
+        return notify(state, "the scene has not been read yet");
+    }
+    state.selection.purpose = purpose;
+    vec![Effect::Send(Command::Pick(state.selection.crosshair))]
+}
+
+pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
+    state.selection.is_mouse_on = !state.selection.is_mouse_on;
+    (state.selection.press, state.selection.is_focusing, state.selection.is_marking) = (None, false, false);
+    let words = if state.selection.is_mouse_on {
+        "mouse on: drag turns, the wheel goes nearer, a click says what is there"
+    } else {
+        "mouse off: a drag selects text; m turns it on again"
+    };
+    say(state, words);
+    vec![Effect::Mouse(state.selection.is_mouse_on)]
+}
+
+/// The answer.
+pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
+    // An older picture is looked at meanwhile.
+    if state.picture.history.is_open() {
+        return Vec::new();
+    }
+    let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
+    state.selection.picked =
+        in_text.map(|thing| FilePlace { path: thing.path.clone(), line: thing.line, column: 1 });
+    match (state.selection.purpose, &picked.thing) {
+        (PickPurpose::Inspect, _) => {
+            state.overlays.message = None;
+            let facts = facts(picked);
+            state.selection.clicked = Some(clicked(picked, &facts));
+            state.selection.facts = Some(facts);
+            state.dirty = true;
+            Vec::new()
+        }
+        (PickPurpose::Focus, None) => notify(state, "there is nothing to focus on"),
+        (PickPurpose::Focus, Some(thing)) => focus_at(state, thing.depth),
+    }
+}
+
+fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
+    let distance = rounded(depth, decimal_step(depth));
+    if !(distance > 0.0) {
+        return notify(state, "there is nothing to focus on");
+    }
+    // The scene may have been edited since.
+    if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
+        return notify(state, IN_FOCUS);
+    }
+    state.request.toggles.camera.focus = Some(distance);
+    let effects = camera::step_of_camera(state);
+    if state.request.toggles.camera.focus.is_some() {
+        say(
+            state,
+            format!("focus at {distance} (preview only). w: save image · c: keep in scene · 0: reset"),
+        );
+    }
+    effects
+}
+
+/// The same in one line, with the pixel.
+fn clicked(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
+    let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
+    facts.join(" · ") + &pixel
+}
+
+/// Copies what was clicked, if the terminal is known to take it.
+pub(super) fn copy(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
+    let Some(clicked) = state.selection.clicked.clone() else {
+        return notify(state, "nothing was clicked yet: click, or press Enter, then y copies what is there");
+    };
+    if !state.display.abilities.clipboard {
+        // It stands there to be selected.
+        return notify(state, &format!("to copy, drag with shift (or after m): {clicked}"));
+    }
+    say(state, format!("copied: {clicked}"));
+    vec![Effect::Aside(chrome::copy(&clicked))]
+}
+
+/// Shape and name, line, material, distance, place, colour, normal.
+fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
+    let light = color.map(|color| format!("radiance {}", numbers(color.map(f64::from))));
+    let Some(thing) = thing else {
+        return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
+    };
+    let Thing { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
+    let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
+    let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let back = if *is_front { "" } else { " (back)" };
+    let mut facts = vec![format!("{shape}{name}")];
+    // The lines of a model's scene are in no file.
+    facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
+    facts.extend([
+        visible(material).into_owned(),
+        format!("{} away", number(*distance)),
+        format!("at {}", numbers(*position)),
+    ]);
+    facts.extend(light);
+    facts.push(format!("normal {}{back}", numbers(normal.map(f64::from))));
+    facts
+}
+
+fn numbers(all: [f64; 3]) -> String {
+    format!("({})", all.map(number).join(", "))
+}
+
+/// Three digits, or all those before the point.
+fn number(number: f64) -> String {
+    let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
+    rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_there_is_said_in_a_few_words_each() {
+        let thing = Thing {
+            shape: "sphere",
+            name: Some("ball".to_owned()),
+            path: "scenes/still.toml".into(),
+            line: 47,
+            material: "glass crystal".to_owned(),
+            position: [0.214, 0.4996, -33.06],
+            normal: [0.0, 1.0, -0.0],
+            is_front: true,
+            distance: 3.8167,
+            depth: 3.5,
+        };
+        let picked = Picked { pixel: [3, 4], thing: Some(thing), color: Some([0.61, 1234.56, 1e-6]) };
+        assert_eq!(
+            facts(&picked),
+            [
+                "sphere \"ball\"",
+                "still.toml:47",
+                "glass crystal",
+                "3.82 away",
+                "at (0.214, 0.5, -33.1)",
+                "radiance (0.61, 1235, 0)",
+                "normal (0, 1, 0)"
+            ]
+        );
+        let of_model = picked.thing.clone().map(|thing| Thing { path: "scenes/vase.obj".into(), ..thing });
+        let of_model = facts(&Picked { thing: of_model, ..picked });
+        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "a model has no lines");
+        assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
+    }
+}

@@ -1,0 +1,67 @@
+//! Requests to the worker.
+
+use super::history;
+use crate::event::Effect;
+use crate::pipeline::protocol::{Command, Request, Writing};
+use crate::state::{Activity, CameraStep, Rendering, State, Toggles};
+use crate::view::layout::Layout;
+
+/// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
+pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
+    // A camera on its way has too many pictures.
+    if state.request.camera_step.generation == Some(state.request.generation) {
+        state.picture.history.drop_unfinished(state.request.generation);
+    } else {
+        history::record(state);
+    }
+    state.picture.shown = state.picture.history.close().or_else(|| state.picture.shown.take());
+    let before = std::mem::replace(&mut state.request.sent_toggles, state.request.toggles);
+    let now = Toggles { exposure: before.exposure, ..state.request.toggles };
+    state.request.is_exposure_only = before == now && before != state.request.toggles;
+    if state.request.is_exposure_only {
+        // The same light, shown brighter or darker.
+        state.picture.history.go_on(state.request.generation);
+    }
+    state.request.generation += 1;
+    let is_moved = state.request.toggles.camera.is_any();
+    state.request.moved_since =
+        is_moved.then_some(state.request.moved_since.unwrap_or(state.request.generation));
+    state.request.note_moved_parts();
+    state.request.preview_size = Layout::preview_size(state);
+    state.request.resize_due = None;
+    state.request.camera_step = CameraStep::default();
+    // A save that this answers says so afterwards.
+    (state.saving.change, state.saving.first_change) = (None, None);
+    state.overlays.unconfirmed = None;
+    state.overlays.are_warnings_known = false;
+    state.dirty = true;
+    let request = Request {
+        generation: state.request.generation,
+        scene: state.request.scene.clone(),
+        overrides: state.request.overrides(),
+        preview: state.request.preview_size,
+        write: if state.request.is_own() { Writing::Try } else { Writing::No },
+        own: state.request.own_overrides(),
+        force,
+        first: state.request.first_section,
+    };
+    let mut effects = Vec::new();
+    if state.work.paused {
+        state.set_paused(false);
+        effects.push(Effect::Send(Command::Pause(false)));
+    }
+    state.work.activity = Activity::Running { since: state.now };
+    state.work.rendering = Rendering::UnderWay;
+    effects.push(Effect::Send(Command::Render(Box::new(request))));
+    effects
+}
+
+/// Requests the same picture at another size, if the window changed; the render goes on.
+pub(super) fn resized_preview(state: &mut State) -> Vec<Effect> {
+    let size = Layout::preview_size(state);
+    if size == state.request.preview_size || size.is_none() {
+        return Vec::new();
+    }
+    state.request.preview_size = size;
+    vec![Effect::Send(Command::Preview(size))]
+}

@@ -1,0 +1,106 @@
+//! Keys of the list of views, while it is open: they walk it, find a name and close it.
+
+use crossterm::event::{KeyCode, KeyModifiers};
+
+use super::request::render;
+use super::say::say;
+use crate::choice::Choice;
+use crate::event::{Effect, KeyPress};
+use crate::keymap::Overlay;
+use crate::pipeline::settings::View;
+use crate::state::State;
+use crate::view::views::rows;
+
+/// Effect of a bound key on the list. `None` if the list is closed, or covered by the help.
+pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> {
+    if state.overlays.views.is_none() || state.overlays.help.open {
+        return None;
+    }
+    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+    let last = View::ALL.len() - 1;
+    let column = rows(state);
+    let chosen = match action {
+        Overlay::LineUp => current.saturating_sub(1),
+        Overlay::LineDown => (current + 1).min(last),
+        Overlay::ColumnLeft => current.checked_sub(column).unwrap_or(current),
+        Overlay::ColumnRight if current + column <= last => current + column,
+        Overlay::ColumnRight => current,
+        Overlay::PageUp => 0,
+        Overlay::PageDown => last,
+        Overlay::Find => {
+            look_for(state, String::new());
+            return Some(Vec::new());
+        }
+        Overlay::Take => {
+            close(state);
+            return Some(Vec::new());
+        }
+        Overlay::Close => return None,
+    };
+    Some(choose(state, View::ALL[chosen]))
+}
+
+/// Effect of a key while a name is typed. `None` if none is.
+pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
+    let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
+    let is_held = key.modifiers.contains(KeyModifiers::CONTROL);
+    match key.code {
+        KeyCode::Char(letter) if !is_held => name.extend(letter.to_lowercase()),
+        KeyCode::Backspace => drop(name.pop()),
+        KeyCode::Enter | KeyCode::Esc => {
+            close(state);
+            return Some(Vec::new());
+        }
+        _ => return None,
+    }
+    let found = found(&name);
+    look_for(state, name);
+    Some(found.map_or_else(Vec::new, |view| choose(state, view)))
+}
+
+/// This view, in the list of them.
+pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
+    state.list_views();
+    state.request.toggles.view = (view != state.request.base_view()).then_some(view);
+    let effects = render(state, false);
+    if state.request.toggles.view.is_some() {
+        let is_empty = view == View::Photons && !state.request.photons();
+        let words = if is_empty {
+            ": photons are off; p turns them on"
+        } else {
+            " (preview only). w: save image · 0: reset"
+        };
+        say(state, format!("view {}{words}", view.name()));
+    }
+    effects
+}
+
+/// The first view whose name begins with this, else the first that has it anywhere.
+fn found(name: &str) -> Option<View> {
+    let begins = |view: &&View| view.name().starts_with(name);
+    let has = |view: &&View| view.name().contains(name);
+    let all = || View::ALL.iter().filter(|_| !name.is_empty());
+    all().find(begins).or_else(|| all().find(has)).copied()
+}
+
+fn look_for(state: &mut State, name: String) {
+    state.list_views();
+    if let Some(views) = &mut state.overlays.views {
+        views.name = Some(name);
+    }
+}
+
+fn close(state: &mut State) {
+    state.overlays.views = None;
+    state.dirty = true;
+}
+
+/// The view that stands already is not rendered again.
+fn choose(state: &mut State, view: View) -> Vec<Effect> {
+    state.list_views();
+    if view == state.request.view() {
+        return Vec::new();
+    }
+    state.overlays.message = None;
+    choose_view(state, view)
+}

@@ -1,0 +1,450 @@
+//! Effects of the worker's events on the state. Events of older generations do nothing, except for those about files.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::request::resized_preview;
+use super::say::{say, say_until_key};
+use super::{camera, history, pointer};
+use crate::chrome;
+use crate::event::{Effect, Unwritten};
+use crate::exit_summary;
+use crate::noise_curve::NoiseCurve;
+use crate::options::OutputChange;
+use crate::pipeline::protocol::{
+    AssetProgress, CheckpointNews, Event, Failure, LastGoodEnd, OwnState, Report, Stage, StageReport, Status,
+};
+use crate::scene::MOST_COMPARED_BYTES;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::sanitize::visible;
+use crate::state::{Activity, AssetBar, OwnImage, Pane, Problems, Rendering, State, Written};
+
+/// Why a picture that is not on disk is not there.
+const UNWRITTEN: &str = "not written: e says why";
+/// Message that ends with the render.
+const GOING_ON: &str = "resuming from";
+
+pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
+    let event = match event {
+        // Whatever is rendered meanwhile, these answer a person.
+        Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
+        Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
+        Event::Picked { picked, .. } => return pointer::picked(state, &picked),
+        Event::WriteDone { paths, .. } => {
+            wrote(state, &paths);
+            return Vec::new();
+        }
+        // Files of pictures of before are there all the same.
+        Event::Written { path, bytes, generation, is_own } if generation != state.request.generation => {
+            note(state, path, bytes, (generation, is_own));
+            return Vec::new();
+        }
+        Event::Done { generation, report, .. } if generation != state.request.generation => {
+            describe(state, generation, &report);
+            return Vec::new();
+        }
+        event => event,
+    };
+    if generation(&event) != state.request.generation {
+        return Vec::new();
+    }
+    // The picture itself is taken from its slot; what is watched is the wiring's.
+    let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
+    state.dirty |= !shows_nothing;
+    match event {
+        Event::Started { .. } => started(state),
+        Event::Stage { stage, .. } => record(state, stage),
+        Event::Asset { progress, .. } => asset(state, progress),
+        Event::Settings { settings, camera, exposure, own, .. } => {
+            state.request.own = Some(own);
+            (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
+            state.request.drop_saved_changes();
+            let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
+            state.request.effective = Some(*settings);
+            mended(state);
+            state.picture.history.read();
+            if pinhole {
+                say(state, "no depth of field: the camera's `aperture` is 0");
+            }
+            // A picture of another shape has another place.
+            return resized_preview(state);
+        }
+        Event::Warnings { warnings, .. } => warn(state, warnings),
+        Event::Progress { progress, .. } => {
+            if let Some(noise) = progress.noise {
+                state.work.curve.note(progress.earlier_seconds + noise.seconds, noise.now);
+            }
+            state.work.progress = Some(progress);
+            let is_rendering = OwnState::Begun { is_rendering: true };
+            if state.request.is_own() {
+                state.saving.own.state = is_rendering;
+            }
+            if state.saving.own.state == is_rendering {
+                state.saving.own.fraction = progress.fraction;
+            }
+        }
+        Event::Files { files, .. } => state.request.note_files(files),
+        Event::Preview { .. }
+        | Event::WriteDone { .. }
+        | Event::CameraKept { .. }
+        | Event::CameraUndone { .. }
+        | Event::Picked { .. } => {}
+        Event::Written { path, bytes, generation, is_own } => {
+            written(state, path, bytes, (generation, is_own));
+        }
+        Event::OwnImage { state: own, .. } => state.saving.own.state = own,
+        Event::WriteFailed { path, message, .. } => {
+            let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
+            // What a key asks for during a render tells nothing of the picture at its end.
+            if !is_by_hand || state.work.activity == Activity::Done {
+                state.saving.unwritten = Some(UNWRITTEN.to_owned());
+            }
+            let is_it = |written: &&mut Written| Some(&written.path) == path.as_ref();
+            state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
+            say_until_key(state, format!("error: {}", visible(&message)));
+            state.saving.write_failed =
+                Some(Unwritten { why: message, generation: state.request.generation, is_refused: false });
+        }
+        Event::NotKept { message, .. } => say_until_key(state, format!("warning: {}", visible(&message))),
+        Event::Checkpoint { news, .. } => match news {
+            CheckpointNews::Failed { message } => {
+                say_until_key(state, format!("warning: {}", visible(&message)));
+            }
+            CheckpointNews::Resumed { path, .. } => {
+                say(state, format!("{GOING_ON} {}", visible(&path.to_string_lossy())));
+            }
+            CheckpointNews::SetAside { path } => {
+                say_until_key(
+                    state,
+                    format!("the checkpoint of another render is {}", visible(&path.to_string_lossy())),
+                );
+            }
+            CheckpointNews::Unused { path, why } => {
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                say_until_key(state, format!("{} is not used: {}", visible(&name), visible(&why)));
+            }
+            CheckpointNews::Written { .. }
+            | CheckpointNews::Finished { .. }
+            | CheckpointNews::Absent { .. }
+            | CheckpointNews::Ignored { .. } => {}
+        },
+        Event::Refused { conflicts, .. } => refused(state, conflicts),
+        Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
+        Event::WritePostponed { .. } => {
+            say(state, "the image is written as soon as every pixel has a sample");
+        }
+        Event::Done { report, warnings, unchanged, .. } => {
+            let time = state.work.rendering_for(state.now);
+            done(state, report, warnings, unchanged);
+            return notice(state, time);
+        }
+        Event::Failed { failure, .. } => {
+            let time = state.work.rendering_for(state.now);
+            failed(state, failure);
+            return notice(state, time);
+        }
+        Event::LastGoodEnded { end, .. } => last_good_ended(state, end),
+        Event::Cancelled { .. } => {
+            (state.work.activity, state.work.rendering) = (Activity::Cancelled, Rendering::Stopped);
+            state.set_paused(false);
+            state.work.assets.clear();
+        }
+    }
+    Vec::new()
+}
+
+/// Tells a person who is looking elsewhere that a long render has ended, if the terminal has a way.
+fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
+    let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
+    let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
+    let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
+    let notice = time.zip(state.display.abilities.notice);
+    notice.map(|(time, way)| Effect::Aside(chrome::notice(state, way, time))).into_iter().collect()
+}
+
+fn generation(event: &Event) -> u64 {
+    match event {
+        Event::Started { generation }
+        | Event::Stage { generation, .. }
+        | Event::Asset { generation, .. }
+        | Event::Warnings { generation, .. }
+        | Event::Settings { generation, .. }
+        | Event::Progress { generation, .. }
+        | Event::Preview { generation }
+        | Event::Written { generation, .. }
+        | Event::OwnImage { generation, .. }
+        | Event::WriteFailed { generation, .. }
+        | Event::NotKept { generation, .. }
+        | Event::Refused { generation, .. }
+        | Event::Checkpoint { generation, .. }
+        | Event::WritePostponed { generation }
+        | Event::WriteDone { generation, .. }
+        | Event::LastGoodEnded { generation, .. }
+        | Event::Text { generation, .. }
+        | Event::Files { generation, .. }
+        | Event::CameraKept { generation, .. }
+        | Event::CameraUndone { generation, .. }
+        | Event::Picked { generation, .. }
+        | Event::Done { generation, .. }
+        | Event::Failed { generation, .. }
+        | Event::Cancelled { generation } => *generation,
+    }
+}
+
+fn started(state: &mut State) {
+    for (before, stage) in state.work.last_seconds.iter_mut().zip(&state.work.stages) {
+        let done = stage.as_ref().filter(|stage| stage.status == Status::Done);
+        *before = done.map(|stage| stage.seconds).or(*before);
+    }
+    state.work.stages = Default::default();
+    state.work.assets.clear();
+    state.work.progress = None;
+    state.work.curve = NoiseCurve::default();
+    state.work.report = None;
+    state.saving.unwritten = None;
+    // An image in its file stays there until samples of another are traced.
+    if state.request.is_own() && state.saving.own.state != OwnState::Written {
+        state.saving.own = OwnImage { state: OwnState::Begun { is_rendering: true }, fraction: 0.0 };
+    }
+    close_empty_pane(state);
+    state.work.unchanged = false;
+}
+
+fn record(state: &mut State, stage: StageReport) {
+    // The bars of a stage go with it.
+    if stage.status != Status::Running {
+        state.work.assets.clear();
+    }
+    if let Some(slot) = state.work.stages.get_mut(stage.name as usize) {
+        *slot = Some(stage);
+    }
+}
+
+/// One bar for each name.
+fn asset(state: &mut State, progress: AssetProgress) {
+    let finished = (progress.done >= progress.total).then_some(state.now);
+    let bar = AssetBar { progress, finished };
+    match state.work.assets.iter_mut().find(|asset| asset.progress.name == bar.progress.name) {
+        Some(asset) => *asset = bar,
+        None => state.work.assets.push(bar),
+    }
+}
+
+/// The files that a key asked for are there.
+fn wrote(state: &mut State, paths: &[PathBuf]) {
+    state.saving.is_write_requested = false;
+    let is_open = state.picture.history.is_open();
+    let which = if is_open { ": the newest picture, not the one that is shown" } else { "" };
+    let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
+    say(state, format!("wrote {}{which}", names.join(", ")));
+}
+
+/// A file is there. It stands beside the picture: a message about each would cover the keys.
+fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
+    // Of several outputs, another one may have failed.
+    let is_by_hand = state.work.activity == Activity::Done;
+    if is_by_hand {
+        (state.saving.unwritten, state.saving.write_failed) = (None, None);
+        close_empty_pane(state);
+    }
+    note(state, path, bytes, (generation, is_own));
+}
+
+/// A picture is in a file. Its render may go on; a report that is there already is of this picture.
+fn note(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
+    let view = if is_own { state.request.base_view() } else { state.request.view() };
+    let made = match &state.work.report {
+        Some(report) => exit_summary::made(report, view),
+        None if generation == state.request.generation => exit_summary::view(view),
+        None => String::new(),
+    };
+    state.saving.written.retain(|other| other.path != path);
+    let shows = (!is_own).then_some(state.saving.write_shows);
+    if !is_own && state.saving.own.state == OwnState::Written {
+        state.saving.own.state = OwnState::Begun { is_rendering: false };
+    }
+    let written = Written { path, bytes, generation, made, shows, is_stale: false, lost: None };
+    state.saving.written.push(written);
+}
+
+/// Describes the files of a finished request, if it wrote its picture at the end.
+fn describe(state: &mut State, generation: u64, report: &Report) {
+    let (is_written, base) = (report.image.path.is_some(), state.request.base_view());
+    for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
+        if is_written || written.shows.is_none() {
+            let view = if written.shows.is_none() { base } else { report.settings.view };
+            written.made = exit_summary::made(report, view);
+        }
+    }
+}
+
+/// Another program has changed a file that glimt wrote, or put it back.
+pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &OutputChange) -> Vec<Effect> {
+    let Some(written) = state.saving.written.iter_mut().find(|written| written.path == *path) else {
+        return Vec::new();
+    };
+    (written.lost, state.dirty) = (*lost, true);
+    if let Some(lost) = lost {
+        let name = visible(&path.to_string_lossy()).into_owned();
+        say_until_key(state, format!("{name} {} · w writes it again", lost.words()));
+    }
+    Vec::new()
+}
+
+/// Shows new conflicts at once; a pane that a person has closed stays closed.
+fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
+    state.saving.is_write_requested = false;
+    state.saving.unwritten = Some(UNWRITTEN.to_owned());
+    say(state, "nothing is written (e shows why)");
+    let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
+    let generation = state.request.generation;
+    state.saving.write_failed = Some(Unwritten { why, generation, is_refused: true });
+    if !conflicts.iter().all(|conflict| state.overlays.warnings.contains(conflict)) {
+        state.overlays.diagnostics = Pane { open: true, scroll: 0 };
+    }
+    state.overlays.warnings.retain(|one| one.severity == Severity::Warning);
+    state.overlays.warnings.splice(0..0, conflicts);
+}
+
+/// The file is whole again.
+fn mended(state: &mut State) {
+    if state.overlays.problems.take().is_some() {
+        state.overlays.diagnostics = Pane::default();
+    }
+}
+
+fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
+    add_earlier_seconds(&mut report);
+    state.overlays.message.take_if(|message| message.words.starts_with(GOING_ON));
+    mended(state);
+    for stage in &report.stages {
+        record(state, stage.clone());
+    }
+    state.request.effective = Some(report.settings.clone());
+    (state.work.activity, state.work.rendering) = (Activity::Done, Rendering::Finished);
+    state.set_paused(false);
+    state.work.assets.clear();
+    // The picture of this request is on disk: none is missing any more.
+    let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
+    if state.request.is_own() && is_on_disk && state.saving.unwritten.is_none() {
+        state.saving.write_failed = None;
+        state.saving.own = OwnImage { state: OwnState::Written, fraction: 1.0 };
+    }
+    note_noise(state, &report, unchanged);
+    describe(state, state.request.generation, &report);
+    state.work.report = Some(report);
+    state.work.unchanged = unchanged;
+    warn(state, warnings);
+    history::record(state);
+    count(state, unchanged);
+    if unchanged {
+        state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
+    }
+    if unchanged && state.saving.change.is_some_and(|change| change.generation == state.request.generation) {
+        state.saving.change = None;
+        state.saving.first_change = None;
+    }
+}
+
+/// Counts the seconds in which earlier requests rendered samples of this image to its render, whose samples they are.
+fn add_earlier_seconds(report: &mut Report) {
+    let all = report.image.render_seconds;
+    let render = &mut report.stages[Stage::Render as usize];
+    if render.status == Status::Done && all > render.seconds {
+        report.seconds += all - render.seconds;
+        render.seconds = all;
+    }
+}
+
+/// Counts a finished run, unless it found the newest picture as another run had left it.
+fn count(state: &mut State, unchanged: bool) {
+    let is_new = !unchanged && !state.request.is_exposure_only;
+    let is_shown = state.picture.history.is_newest(state.request.generation);
+    if is_new || is_shown && state.picture.history.awaits_run() {
+        state.work.renders += 1;
+        if is_shown {
+            state.picture.history.finish(state.work.renders);
+        }
+    }
+}
+
+/// Ends the curve of noise with what was measured. The same picture, or that picture brighter, has the curve that it had.
+fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
+    let render = &report.stages[Stage::Render as usize];
+    let origin = state.request.origin(false).of_light();
+    match render.status {
+        Status::Done => {
+            if let Some(error) = report.image.error {
+                state.work.curve.end(render.seconds, error);
+            }
+            state.work.keep_curve(origin);
+        }
+        Status::Reused if unchanged || state.request.is_exposure_only => {
+            state.work.curve = state.work.last_curve.clone();
+        }
+        Status::Reused => state.work.find_curve(&origin),
+        Status::Running | Status::Skipped => {}
+    }
+    state.work.last_curve = state.work.curve.clone();
+}
+
+fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
+    state.overlays.warnings = warnings;
+    state.overlays.diagnostics.open &= !state.reported().is_empty();
+    state.overlays.are_warnings_known = true;
+}
+
+/// Closes the pane of errors if nothing is left in it.
+fn close_empty_pane(state: &mut State) {
+    state.overlays.diagnostics.open &= state.overlays.problems.is_some() || !state.reported().is_empty();
+}
+
+/// Holds back errors in a file that may be half written until they persist.
+fn failed(state: &mut State, failure: Failure) {
+    state.set_paused(false);
+    state.work.assets.clear();
+    state.saving.change = None;
+    match failure {
+        // The last good scene is rendered.
+        Failure::Scene(_) => state.picture.history.broken(),
+        Failure::Work(_) => state.work.rendering = Rendering::Stopped,
+    }
+    match failure {
+        Failure::Scene(diagnostics) if !state.saving.is_settled => {
+            state.work.activity = Activity::Waiting;
+            state.overlays.unconfirmed = Some(diagnostics);
+        }
+        Failure::Scene(diagnostics) => broken(state, Problems { diagnostics, work: None }),
+        Failure::Work(message) => broken(state, Problems { diagnostics: Vec::new(), work: Some(message) }),
+    }
+}
+
+/// The render of the last good scene, whose picture is the newest while the file is broken, has ended.
+fn last_good_ended(state: &mut State, end: LastGoodEnd) {
+    match end {
+        LastGoodEnd::Finished { unchanged } => {
+            state.work.rendering = Rendering::Finished;
+            history::record(state);
+            count(state, unchanged);
+        }
+        LastGoodEnd::Stopped => state.work.rendering = Rendering::Stopped,
+    }
+}
+
+/// Shows new problems; a pane that a person has closed stays closed.
+fn broken(state: &mut State, problems: Problems) {
+    state.work.activity = Activity::Broken;
+    if state.overlays.problems.as_ref() != Some(&problems) {
+        state.overlays.problems = Some(problems);
+        state.overlays.diagnostics = Pane { open: true, scroll: 0 };
+    }
+    state.dirty = true;
+}
+
+/// Nobody is writing the files any more: what was found wrong with them is so.
+pub(super) fn settled(state: &mut State) {
+    state.saving.is_settled = true;
+    if let Some(diagnostics) = state.overlays.unconfirmed.take() {
+        broken(state, Problems { diagnostics, work: None });
+    }
+}

@@ -1,0 +1,117 @@
+//! Noise against time as a small curve, with the requested `error` as a line. Both axes are logarithmic.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::Style;
+use ratatui::symbols::Marker;
+use ratatui::text::Span;
+use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
+
+use super::text::{Tone, put, row, seconds, share, wrapped};
+use crate::color::ColorDepth;
+use crate::preview_kind::PreviewKind;
+use crate::state::State;
+
+/// Rows of the curve itself.
+const LEAST_ROWS: u16 = 6;
+const MOST_ROWS: u16 = 12;
+/// More columns say no more.
+const MOST_COLUMNS: u16 = 60;
+/// A curve has so many points at least, and its times differ by this factor.
+const LEAST_POINTS: usize = 3;
+const LEAST_RATIO: f64 = 1.5;
+
+/// Draws it from the top of an area. Returns the rows that it takes: none if there is nothing to draw, or no room.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
+    let area = Rect { width: area.width.min(MOST_COLUMNS), ..area }.intersection(buffer.area);
+    let (Some(rows), Some(points)) = (rows(state, area), points(state)) else { return 0 };
+    let depth = state.display.depth;
+    put(buffer, row(area, 0), &[("noise while it rendered", Tone::Strong)], depth);
+    let caption = caption(state, points, area.width);
+    let chart = Rect { y: area.y + 1, height: rows - 1 - caption.len() as u16, ..area };
+    plot(state, points, chart, buffer);
+    for (index, line) in (chart.bottom() - area.y..).zip(&caption) {
+        put(buffer, row(area, index), &[(line, Tone::Faint)], depth);
+    }
+    rows
+}
+
+/// Rows of the curve with its words. `None` if they do not fit.
+pub(super) fn rows(state: &State, area: Rect) -> Option<u16> {
+    let words = 1 + caption(state, points(state)?, area.width.min(MOST_COLUMNS)).len() as u16;
+    let chart = area.height.checked_sub(words)?.min(MOST_ROWS);
+    (chart >= LEAST_ROWS && area.width >= 20).then_some(words + chart)
+}
+
+/// The points of the picture at hand, if they are a curve.
+fn points(state: &State) -> Option<&[(f64, f64)]> {
+    let points = state.work.curve.points();
+    let [(first, _), .., (last, _)] = points else { return None };
+    (points.len() >= LEAST_POINTS && *last >= first * LEAST_RATIO).then_some(points)
+}
+
+/// The requested noise of each tile.
+fn target(state: &State) -> Option<f64> {
+    state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
+}
+
+/// A blank at which no line ends.
+const UNBROKEN: &str = "\u{a0}";
+
+/// Caption of the curve, in plain words; a number stays with its unit.
+fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
+    let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
+    let whole = |amount: String| amount.replace(' ', UNBROKEN);
+    let (from, first) = (whole(share(*from)), whole(seconds(*first)));
+    let (to, last) = (whole(share(*to)), whole(seconds(*last)));
+    let fell = format!("{from} after {first}, {to} after {last}");
+    let line = match target(state) {
+        Some(target) => format!(
+            "; the line is the {} asked of each tile",
+            whole(share(f64::from((target * 1e6).round() as f32) / 1e6))
+        ),
+        None => String::new(),
+    };
+    wrapped(&(fell + &line), usize::from(width)).iter().map(|line| line.replace(UNBROKEN, " ")).collect()
+}
+
+fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
+    let depth = state.display.depth;
+    let log = |(seconds, noise): &(f64, f64)| (seconds.log10(), noise.log10());
+    let curve: Vec<(f64, f64)> = points.iter().map(log).collect();
+    let ends = |of: &dyn Fn(&(f64, f64)) -> f64, more: Option<f64>| {
+        let all = || curve.iter().map(of).chain(more);
+        [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)]
+    };
+    let target = target(state).map(f64::log10);
+    let (x, y) = (ends(&|point| point.0, None), ends(&|point| point.1, target));
+    let line = target.map(|target| [(x[0], target), (x[1], target)]);
+    // A line along the edge would not be seen.
+    let margin = 0.05 * (y[1] - y[0]).max(0.1);
+    let bounds = [y[0] - margin, y[1] + margin];
+    let style = |tone: Tone| tone.style(depth);
+    let dataset = |data, tone| {
+        Dataset::default().data(data).marker(marker(state)).graph_type(GraphType::Line).style(style(tone))
+    };
+    let mut sets = Vec::new();
+    sets.extend(line.as_ref().map(|line| dataset(&line[..], Tone::Good)));
+    sets.push(dataset(&curve, Tone::Working));
+    let axis = |bounds, labels: [String; 2]| {
+        let labels = labels.map(|label| Span::styled(label, style(Tone::Faint)));
+        Axis::default().bounds(bounds).labels(labels).style(style(Tone::Faint))
+    };
+    let ten = |power: f64| 10_f64.powf(power);
+    Chart::new(sets)
+        .style(Style::new())
+        .legend_position(None)
+        .x_axis(axis(x, x.map(|x| seconds(ten(x)))))
+        .y_axis(axis(bounds, y.map(|y| share(ten(y)))))
+        .render(area, buffer);
+}
+
+/// Dots of eighths of a cell, where the terminal is likely to draw them.
+fn marker(state: &State) -> Marker {
+    let is_simple = state.display.kind == PreviewKind::Ascii
+        || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);
+    if is_simple { Marker::Dot } else { Marker::Braille }
+}

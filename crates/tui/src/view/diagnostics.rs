@@ -1,0 +1,166 @@
+//! The pane of errors and warnings: beside the picture, else over its lower part.
+
+use std::collections::HashMap;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::{Clear, Widget};
+
+use super::layout::Layout;
+use super::stages::Line;
+use super::text::{Tone, counted, put, put_right, row, wrapped};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::report::{self, Role};
+use crate::scene::sanitize::visible;
+use crate::state::State;
+
+/// Faults that are shown; who mends them sees the next ones.
+const MOST: usize = 100;
+
+/// Places of one fault that are shown.
+const MOST_PLACES: usize = 10;
+
+/// Draws it, from the line that the person scrolled to.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+    let area = area.intersection(buffer.area);
+    let text = text(state, area);
+    let area = fitting(area, text.len(), area == Layout::of(state).panel);
+    let (page, last) = span(&text, area);
+    let first = state.overlays.diagnostics.scroll.min(last);
+    Clear.render(area, buffer);
+    title(state, row(area, 0), (last > 0).then_some((first, page, text.len())), buffer);
+    for (index, line) in (1..area.height).zip(text.iter().skip(first)) {
+        let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
+        put(buffer, row(area, index), &pieces, state.display.depth);
+    }
+}
+
+/// The cells that it lies over. Empty while it is closed.
+pub(super) fn covered(state: &State) -> Rect {
+    let Layout { pane, panel, .. } = Layout::of(state);
+    if state.overlays.diagnostics.open {
+        fitting(pane, text(state, pane).len(), pane == panel)
+    } else {
+        Rect::ZERO
+    }
+}
+
+/// The lower part of an area that these lines and their title need; all of a panel.
+fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
+    if is_panel {
+        return area;
+    }
+    let height = u16::try_from(lines + 1).unwrap_or(u16::MAX).clamp(area.height.min(4), area.height);
+    Rect { y: area.bottom() - height, height, ..area }
+}
+
+/// A rule with the number of errors, and which lines are in sight where these are not all.
+fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
+    let reported = state.reported();
+    let has_error = reported.iter().any(|one| one.severity == Severity::Error);
+    let tone = if state.overlays.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
+    let rule = "─".repeat(usize::from(area.width));
+    put(buffer, area, &[(&rule, tone)], state.display.depth);
+    let words = match &state.overlays.problems {
+        Some(_) => super::header::errors(state),
+        None => report::summary(&reported),
+    };
+    let mut room = area;
+    if let Some((first, page, all)) = shown {
+        let lines = format!(" lines {}-{} of {all} ", first + 1, first + page);
+        room.width -= put_right(buffer, area, &lines, tone, state.display.depth);
+    }
+    let room = super::text::rest(room, 1);
+    put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
+}
+
+/// Lines on a page of the pane, and the furthest line that it can be scrolled to.
+pub(crate) fn extent(state: &State) -> (usize, usize) {
+    let area = Layout::of(state).pane;
+    let text = text(state, area);
+    span(&text, area)
+}
+
+fn span(text: &[Line], area: Rect) -> (usize, usize) {
+    let page = usize::from(area.height.saturating_sub(1)).max(1);
+    (page, text.len().saturating_sub(page))
+}
+
+fn text(state: &State, area: Rect) -> Vec<Line> {
+    let width = usize::from(area.width);
+    let Some(problems) = &state.overlays.problems else { return reported(&state.reported(), width) };
+    let mut text = Vec::new();
+    if let Some(work) = &problems.work {
+        text.extend(toned(&format!("error: {}", visible(work)), width, Tone::Error));
+    }
+    text.extend(reported(&problems.diagnostics, width));
+    text
+}
+
+/// Lines of the diagnostics, errors first; a fault in several places appears once, with all of them.
+fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
+    let mut numbers = HashMap::new();
+    let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
+    for one in diagnostics {
+        let label = one.place.as_ref().map(|place| place.label.as_str());
+        let is_error = one.severity == Severity::Error;
+        let number =
+            *numbers.entry((is_error, &one.message, &one.path, &one.help, label)).or_insert(faults.len());
+        match faults.get_mut(number) {
+            Some(fault) => fault.push(one),
+            None => faults.push(vec![one]),
+        }
+    }
+    let start = |one: &Diagnostic| one.place.as_ref().map(|place| place.span.start);
+    for fault in &mut faults {
+        fault.sort_by_key(|one| start(one));
+    }
+    faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
+    let mut lines: Vec<Line> = faults.iter().take(MOST).flat_map(|fault| one_fault(fault, width)).collect();
+    lines.pop();
+    if let Some(more @ 1..) = faults.len().checked_sub(MOST) {
+        lines.push(Line::new());
+        lines.push(vec![(format!("… {} are not shown", counted(more, "more fault")), Tone::Plain)]);
+    }
+    lines
+}
+
+/// The first place in full, the others by line and column; an empty line.
+fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
+    let tone = |role| match role {
+        Role::Text => Tone::Plain,
+        Role::Error => Tone::Error,
+        Role::Warning => Tone::Warning,
+        Role::Frame => Tone::Faint,
+        Role::Message => Tone::Strong,
+    };
+    let line = |line: report::Line| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
+    let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
+    // The report ends with an empty line and a count, which stands in the title.
+    lines.truncate(lines.len().saturating_sub(2));
+    let mut lines: Vec<Line> = lines.into_iter().map(line).collect();
+    let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
+    if !places.is_empty() {
+        let shown = places.len().min(MOST_PLACES - 1);
+        let more = match places.len() - shown {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let number = counted(places.len(), "place");
+        let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
+        lines.extend(toned(&text, width, Tone::Plain));
+    }
+    lines.push(Line::new());
+    lines
+}
+
+/// `line:column`.
+fn place(one: &Diagnostic) -> Option<String> {
+    let place = one.place.as_ref()?;
+    let (line, column) = report::line_and_column(&place.source, place.span.start);
+    Some(format!("{line}:{column}"))
+}
+
+fn toned(text: &str, width: usize, tone: Tone) -> Vec<Line> {
+    wrapped(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
+}

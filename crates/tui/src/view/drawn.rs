@@ -1,0 +1,43 @@
+//! Parts of the screen besides cells, as drawn last.
+
+use std::path::PathBuf;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::text::{Tone, columns, put};
+use crate::scene::sanitize::visible;
+use crate::state::State;
+
+/// Links, and cells that wait for the picture.
+#[derive(Debug, Default, PartialEq)]
+pub(crate) struct Drawn {
+    /// Cells of names of files.
+    pub(crate) files: Vec<(Rect, PathBuf)>,
+    /// Cells that come after the picture over a thin line.
+    pub(crate) later: Rect,
+}
+
+impl Drawn {
+    /// Writes the pieces of a line, and notes where names of written files are. Returns the columns used.
+    pub(super) fn put(
+        &mut self,
+        state: &State,
+        area: Rect,
+        line: &[(String, Tone)],
+        buffer: &mut Buffer,
+    ) -> u16 {
+        let mut x = area.x;
+        for (text, tone) in line {
+            let end = x.saturating_add(columns(text)).min(area.right());
+            let cells = Rect { x, width: end.saturating_sub(x), ..area };
+            let is_its = |path: &&PathBuf| visible(&path.to_string_lossy()) == *text;
+            let written = state.saving.written.iter().map(|written| &written.path);
+            let path = (*tone == Tone::File).then(|| written.clone().find(is_its)).flatten();
+            self.files.extend(path.map(|path| (Rect { height: 1, ..cells }, path.clone())));
+            x = end;
+        }
+        let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
+        put(buffer, area, &pieces, state.display.depth)
+    }
+}

@@ -1,0 +1,234 @@
+//! The line at the top: what is going on, of what, and how far it is. Where the picture is alone it is all there is.
+
+use std::time::Duration;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::layout::{BLOCK, Layout};
+use super::message;
+use super::stages::at_work;
+use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
+use crate::action::Action;
+use crate::choice::Choice;
+use crate::history::ago;
+use crate::keymap;
+use crate::pipeline::protocol::RenderProgress;
+use crate::pipeline::settings::View;
+use crate::pipeline::words::Eta;
+use crate::scene::diagnostic::Severity;
+use crate::scene::sanitize::visible;
+use crate::state::{Activity, State};
+
+/// From this width on there is room for that.
+const WIDE: u16 = 60;
+/// A name of fewer columns says nothing.
+const LEAST_NAME: u16 = 6;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.header;
+    let used = block(state, area, buffer);
+    let mut room = rest(area, used + 1);
+    // Where there is no other line for a message it takes all of this one.
+    if layout.keys.is_empty() && message::is_said(state, layout) {
+        return;
+    }
+    if state.picture.is_alone {
+        let back =
+            keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
+        room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
+    }
+    let figures = figures(state);
+    // The name has room beside them, if the shortest of them leave it.
+    let fitting = [LEAST_NAME + 1, 0]
+        .into_iter()
+        .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
+    room.width -=
+        put_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
+    room.width = room.width.saturating_sub(1);
+    if room.width >= LEAST_NAME {
+        name(state, room, buffer);
+    }
+}
+
+/// The state in its colour. Returns the columns used.
+fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
+    let (sign, word, tone) = activity(state);
+    let mut text = format!(" {sign} {word} ");
+    if area.width >= WIDE {
+        text = format!("{text:<BLOCK$}");
+    }
+    let area = area.intersection(buffer.area);
+    if area.is_empty() {
+        return 0;
+    }
+    let width = usize::from(area.width);
+    let end = buffer.set_stringn(area.x, area.y, text, width, tone.block(state.display.depth)).0;
+    end - area.x
+}
+
+/// A sign, a word and a colour, each of which tells it.
+pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
+    if state.picture.history.is_open() { ("◂", "older", Tone::Warning) } else { work(state) }
+}
+
+fn work(state: &State) -> (&'static str, &'static str, Tone) {
+    match state.work.activity {
+        _ if state.work.paused => ("‖", "paused", Tone::Warning),
+        Activity::Running { .. } => ("●", "rendering", Tone::Working),
+        Activity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
+        Activity::Done => ("✓", "done", Tone::Good),
+        Activity::Waiting => ("…", "waiting", Tone::Warning),
+        Activity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", Tone::Error),
+        Activity::Broken => ("✗", "broken", Tone::Error),
+        Activity::Cancelled => ("■", "stopped", Tone::Warning),
+    }
+}
+
+/// The word for the work, whatever picture is looked at.
+pub(super) fn word(state: &State) -> &'static str {
+    work(state).1
+}
+
+/// The file with its folder, the view, the picture's size.
+fn name(state: &State, area: Rect, buffer: &mut Buffer) {
+    let path = state.request.scene.to_string_lossy();
+    let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
+    let (folder, file) = (visible(folder), visible(file));
+    // The size of an older picture is not known.
+    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_open());
+    let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
+    let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+    let view = close_up(state) + &view(state);
+    let view = (&*view, Tone::Strong);
+    let mut pieces = vec![(&*folder, Tone::Faint), (&*file, Tone::Strong), view, (&*size, Tone::Faint)];
+    // What does not fit is left out before the name is cut.
+    let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| columns(text)).sum::<u16>();
+    if width(&pieces) > area.width {
+        pieces.remove(0);
+    }
+    while pieces.len() > 1 && width(&pieces) > area.width {
+        pieces.pop();
+    }
+    put(buffer, area, &pieces, state.display.depth);
+}
+
+/// The view, unless it is beauty, and its range.
+fn view(state: &State) -> String {
+    let open = state.picture.history.origin_of_open();
+    let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
+    let view = of_open.unwrap_or_else(|| state.request.view());
+    if view == View::Beauty {
+        return String::new();
+    }
+    let is_at_hand = |generation: u64| open.is_some() || generation == state.request.generation;
+    let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
+    let range = shown.and_then(|shown| shown.range);
+    let range =
+        range.map_or(String::new(), |[least, most]| format!(" {} to {}", number(least), number(most)));
+    format!("  view {}{range}", view.name())
+}
+
+/// Whether the picture at hand lacks the light that photons bring.
+fn lacks_photons(state: &State) -> bool {
+    state
+        .picture
+        .shown
+        .as_ref()
+        .is_some_and(|shown| shown.lacks_photons && shown.generation == state.request.generation)
+}
+
+/// Whether the picture is shown pixel by pixel.
+fn close_up(state: &State) -> String {
+    let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
+    if is_close { "  1:1".to_owned() } else { String::new() }
+}
+
+/// Progress or result, in full and in short.
+fn figures(state: &State) -> Vec<String> {
+    if let Some((run, time)) = state.picture.history.place() {
+        let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
+        let (place, words) = match run {
+            Some(run) => {
+                let place = format!("{run} of {}", last_run(state));
+                (place.clone(), format!("picture {place}"))
+            }
+            None => {
+                let place = if is_unfinished { "unfinished" } else { "older" };
+                (place.to_owned(), format!("{place} picture"))
+            }
+        };
+        let age = ago(state.now.saturating_duration_since(time));
+        let mut figures = vec![format!("{words}, {age}"), place.clone()];
+        // The newest one is at work meanwhile.
+        if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
+            let done = format!("newest {} %", percent(progress.fraction));
+            let eta = eta(state, progress);
+            figures = [
+                format!("{words}, {age}  {done}{eta}"),
+                format!("{place}  {done}{eta}"),
+                format!("{place}  {done}"),
+                place,
+            ]
+            .into();
+        }
+        return figures;
+    }
+    if state.work.is_running() && lacks_photons(state) {
+        return ["shown without photons yet", "no photons yet"].map(str::to_owned).to_vec();
+    }
+    match (state.work.activity, &state.work.report, &state.work.progress) {
+        (Activity::Running { .. }, _, Some(progress)) => {
+            let done = format!("{} %", percent(progress.fraction));
+            vec![format!("{done}{}", eta(state, progress)), done]
+        }
+        (Activity::Running { .. }, _, None) => {
+            at_work(state).map(|name| format!("{name}…")).into_iter().collect()
+        }
+        (Activity::Done, _, _) if state.work.unchanged => {
+            vec![format!("unchanged · run {}", state.work.renders), "unchanged".to_owned()]
+        }
+        (Activity::Done, Some(report), _) => {
+            let time = seconds(report.seconds);
+            vec![format!("{time} · run {}", state.work.renders), time]
+        }
+        (Activity::Waiting, _, _) => vec!["for the file to be whole".to_owned()],
+        (Activity::Broken, _, _) if state.overlays.is_scene_missing() => {
+            vec!["waiting for the file".to_owned()]
+        }
+        (Activity::Broken, _, _) => vec![errors(state)],
+        (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
+    }
+}
+
+/// Number of the newest run; of the one under way, if it has a picture.
+fn last_run(state: &State) -> u64 {
+    let history = &state.picture.history;
+    let is_under_way =
+        state.work.is_under_way() && history.is_newest(state.request.generation) && history.awaits_run();
+    state.work.renders + u64::from(is_under_way)
+}
+
+/// Time until the end, unless the render is paused.
+fn eta(state: &State, progress: &RenderProgress) -> String {
+    /// Less than that rounds to no time at all.
+    const LEAST: f64 = 0.05;
+    let eta = match Eta::of(progress) {
+        None => "…".to_owned(),
+        Some(Eta::OverADay) => Eta::OverADay.words(),
+        Some(Eta::Seconds(eta)) if eta < LEAST => "under 1 s".to_owned(),
+        Some(Eta::Seconds(eta)) => running(Duration::try_from_secs_f64(eta).unwrap_or_default()),
+    };
+    if state.work.paused { String::new() } else { format!("  ETA {eta}") }
+}
+
+/// Number of errors, and of warnings if there are any.
+pub(super) fn errors(state: &State) -> String {
+    let Some(problems) = &state.overlays.problems else { return String::new() };
+    let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();
+    let errors = counted(count(Severity::Error) + usize::from(problems.work.is_some()), "error");
+    match count(Severity::Warning) {
+        0 => errors,
+        warnings => format!("{errors}, {}", counted(warnings, "warning")),
+    }
+}

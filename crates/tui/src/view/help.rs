@@ -1,0 +1,111 @@
+//! The overlay of keys, made from the tables of keys.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::{Block, BorderType, Clear, Widget};
+
+use super::layout::Layout;
+use super::text::{Tone, columns, put, row, wrapped};
+use crate::keymap::{KEYMAP, OVERLAY};
+use crate::state::State;
+
+/// Notes about the rest of the screen.
+const NOTES: &[(&str, &str)] = &[
+    ("saved → seen", "from a save to the first changed cell"),
+    ("31 kB sent", "since this render began; the terminal's time to answer"),
+    ("noise 2 % in all", "against the brightness of the whole picture"),
+    ("asked 1 % a tile", "each tile against its own brightness; ✓ all are there"),
+    ("bold", "what the last edit or a key has changed"),
+    ("render 1 s −.3 s", "the time of a stage, and against the last time"),
+    ("run 3", "finished pictures so far; strip and n N have the same number"),
+];
+
+/// In the middle of the screen.
+pub(super) fn draw(state: &State, buffer: &mut Buffer) {
+    let area = area(state);
+    let inner = inner(area);
+    let (page, last) = extent(state);
+    let first = state.overlays.help.scroll.min(last);
+    let lines = lines(inner.width);
+    let mut title = " keys ".to_owned();
+    if last > 0 {
+        title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
+    }
+    Clear.render(area, buffer);
+    // Lines of words that it covers in part would be cut without a mark.
+    let Layout { header, under, .. } = Layout::of(state);
+    for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
+        Clear.render(line.intersection(buffer.area), buffer);
+    }
+    if inner != area {
+        let border = Tone::Faint.style(state.display.depth);
+        let title_style = Tone::Strong.style(state.display.depth);
+        let block = Block::bordered().border_type(BorderType::Rounded).border_style(border);
+        block.title_style(title_style).title(title).render(area, buffer);
+    }
+    let labels = labels(inner.width);
+    for (index, (label, help)) in (0..inner.height).zip(lines.iter().skip(first)) {
+        let line = row(inner, index);
+        let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
+        put(buffer, place, &[(label, Tone::Strong)], state.display.depth);
+        put(buffer, super::text::rest(line, labels + BESIDE), &[(help, Tone::Plain)], state.display.depth);
+    }
+}
+
+/// Columns beside the labels and their texts.
+const BESIDE: u16 = 3;
+
+/// Columns of the labels, if the help has `width`.
+fn labels(width: u16) -> u16 {
+    const LEAST: u16 = 9;
+    widest(|(label, _)| label).min(LEAST.max(width / 3))
+}
+
+/// The entries, each in as many lines as it needs.
+fn lines(width: u16) -> Vec<(String, String)> {
+    let labels = labels(width);
+    let both = |(label, help)| {
+        let label = wrapped(label, usize::from(labels));
+        let help = wrapped(help, usize::from(width.saturating_sub(labels + BESIDE)));
+        let line = |of: &[String], index: usize| of.get(index).cloned().unwrap_or_default();
+        let count = label.len().max(help.len());
+        (0..count).map(|index| (line(&label, index), line(&help, index))).collect::<Vec<_>>()
+    };
+    entries().flat_map(both).collect()
+}
+
+/// Lines on a page of the help, and the furthest line that it can be scrolled to.
+pub(crate) fn extent(state: &State) -> (usize, usize) {
+    let inner = inner(area(state));
+    let page = usize::from(inner.height).max(1);
+    (page, lines(inner.width).len().saturating_sub(page))
+}
+
+fn entries() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let keys = KEYMAP.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
+    let overlay = OVERLAY.iter().filter(|it| !it.help.is_empty()).map(|it| (it.label, it.help));
+    keys.chain(overlay).chain(NOTES.iter().copied())
+}
+
+fn widest(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
+    entries().map(|entry| columns(part(entry))).max().unwrap_or(0)
+}
+
+fn area(state: &State) -> Rect {
+    let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
+    // The line of keys tells how to scroll and to close.
+    let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
+    let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;
+    let wide = centred(above, width, above.height);
+    let height = u16::try_from(lines(inner(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);
+    centred(above, width, height)
+}
+
+fn inner(area: Rect) -> Rect {
+    if area.height > 3 && area.width > 3 { Block::bordered().inner(area) } else { area }
+}
+
+fn centred(area: Rect, width: u16, height: u16) -> Rect {
+    let (width, height) = (width.min(area.width), height.min(area.height));
+    Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height }
+}

@@ -1,0 +1,254 @@
+//! The line of keys: the toggles with their values, what is of use now, and the way to the rest.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::header::activity;
+use super::layout::Layout;
+use super::message;
+use super::text::{Tone, columns, put, rest};
+use crate::action::Action;
+use crate::choice::Choice;
+use crate::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
+use crate::preview_kind::PreviewKind;
+use crate::scene::is_mesh;
+use crate::scene::report::summary;
+use crate::state::{Activity, State, Toggles, ViewList};
+
+/// A key with its description, in full and in short.
+struct Hint {
+    key: &'static str,
+    words: String,
+    short: String,
+    tone: Tone,
+}
+
+impl Hint {
+    fn new(key: &'static str, words: impl Into<String>) -> Self {
+        let words = words.into();
+        Self { key, short: words.clone(), words, tone: Tone::Faint }
+    }
+
+    fn of(action: Action) -> Option<Self> {
+        keymap::of(action).map(|it| Self::new(it.label, it.hint))
+    }
+
+    fn width(&self, is_long: bool) -> u16 {
+        columns(self.key) + 1 + columns(self.said(is_long)) + GAP
+    }
+
+    fn said(&self, is_long: bool) -> &str {
+        if is_long { &self.words } else { &self.short }
+    }
+}
+
+/// Between two of them.
+const GAP: u16 = 2;
+/// Columns kept for the hints of use now, before the toggles appear in full.
+const OF_USE: u16 = 26;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let area = layout.keys;
+    if layout.under.is_empty() && message::is_said(state, layout) {
+        return;
+    }
+    let ways = [Hint::of(Action::Quit), Hint::of(Action::ToggleHelp)];
+    let ways: Vec<Hint> = ways.into_iter().flatten().collect();
+    let width = |hints: &[Hint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
+    // The help is never left out.
+    let skipped = usize::from(area.width < 44 && ways.len() > 1);
+    let ways = &ways[skipped..];
+    let toggles = if state.overlays.help.open { Vec::new() } else { toggles(state) };
+    let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
+    let is_long = width(&toggles, true) + OF_USE <= room;
+    let mut left = Rect { width: room, ..area };
+    for hint in fitting(of_use_first(state), toggles, room, is_long) {
+        left = rest(left, show(&hint, left, is_long, state, buffer));
+    }
+    let mut right = rest(area, room);
+    for hint in ways {
+        right = rest(right, show(hint, right, true, state, buffer));
+    }
+}
+
+/// Toggles and what is of use: what is urgent has its place, then the toggles, then what else there is room for.
+fn fitting(
+    (urgent, useful): (Vec<Hint>, Vec<Hint>),
+    toggles: Vec<Hint>,
+    room: u16,
+    is_long: bool,
+) -> Vec<Hint> {
+    let mut left = room;
+    let mut take = |hints: Vec<Hint>| -> Vec<Hint> {
+        let fits = |hint: &Hint| {
+            let width = hint.width(is_long);
+            let fits = width <= left;
+            left -= if fits { width } else { 0 };
+            fits
+        };
+        hints.into_iter().filter(fits).collect()
+    };
+    let urgent = take(urgent);
+    let toggles = take(toggles);
+    toggles.into_iter().chain(urgent).chain(take(useful)).collect()
+}
+
+fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
+    let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.said(is_long), hint.tone)];
+    put(buffer, area, &pieces, state.display.depth);
+    hint.width(is_long)
+}
+
+/// Each toggle with its value, in bold where the keys have changed it.
+fn toggles(state: &State) -> Vec<Hint> {
+    // They are those of the newest picture.
+    if state.picture.history.is_open() {
+        return Vec::new();
+    }
+    let honours_shadows = state.request.integrator().method().honours_shadows;
+    let shadows = if honours_shadows { state.request.shadows().name() } else { "–" };
+    let on_off = |on| if on { "on" } else { "off" };
+    let photons = on_off(state.request.effective.as_ref().is_some_and(|it| it.photons));
+    let keys = &state.request.toggles;
+    let all = [
+        (Action::CycleShadows, "shadows", shadows.to_owned(), keys.shadows.is_some()),
+        (Action::TogglePhotons, "photons", photons.to_owned(), keys.photons.is_some()),
+        (Action::ToggleDepthOfField, "dof", on_off(depth_of_field(state)).to_owned(), keys.dof.is_some()),
+        (Action::NextView, "view", state.request.view().name().to_owned(), keys.view.is_some()),
+        (
+            Action::CycleIntegrator,
+            "",
+            state.request.integrator().name().to_owned(),
+            keys.integrator.is_some(),
+        ),
+    ];
+    let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
+        let key = keymap::of(action)?.label.split(' ').next()?;
+        let words = format!("{name} {value}").trim_start().to_owned();
+        Some(Hint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
+    };
+    all.into_iter().filter_map(hint).collect()
+}
+
+/// Hints of use now: the urgent ones, and the others.
+fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
+    let overlay = |wanted: &[Overlay]| -> Vec<Hint> {
+        let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
+        of.map(|it| Hint::new(it.label, it.hint)).collect()
+    };
+    let closing = || overlay(&[Overlay::Close]);
+    // The keys that scroll, where something is out of sight.
+    let scrolling = |last: usize, keys: &[Overlay]| if last > 0 { overlay(keys) } else { Vec::new() };
+    if state.overlays.help.open {
+        let (_, last) = super::help::extent(state);
+        let lines = scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing());
+        return (lines.chain(scrolling(last, &[Overlay::PageDown])).collect(), Vec::new());
+    }
+    let mut urgent = Vec::new();
+    if let Some(views) = &state.overlays.views {
+        urgent.extend(of_views(views).into_iter().chain(closing()));
+    } else if state.overlays.diagnostics.open {
+        let (_, last) = super::diagnostics::extent(state);
+        urgent.extend(scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing()));
+    }
+    urgent.extend(unseen(state));
+    let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
+    let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
+    if has_place && !is_mesh(&state.request.scene) {
+        urgent.extend(named(Action::Edit, "edit"));
+    }
+    if state.picture.history.is_open() {
+        urgent.extend(named(Action::BeforeAfter, "newest"));
+        let both = if state.picture.history.is_oldest_open() {
+            named(Action::NewerPicture, "newer")
+        } else {
+            named(Action::OlderPicture, "older, newer")
+        };
+        urgent.extend(both);
+        // All else is about the newest one.
+        return (urgent, Hint::of(Action::PictureAlone).into_iter().collect());
+    }
+    if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
+        urgent.extend(named(Action::KeepCamera, "keep"));
+    }
+    if state.picture.close_up.is_some() {
+        urgent.extend(named(Action::CloseUp, "back"));
+    }
+    if state.request.first_section.is_some() {
+        let first = named(Action::RectangleFirst, "rectangle first");
+        urgent.extend(first.map(|hint| Hint { tone: Tone::Strong, ..hint }));
+    }
+    let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
+    let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
+    let changes = state.request.changes().join(", ");
+    urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
+    let now: &[Action] = match state.work.activity {
+        _ if state.work.paused => &[Action::TogglePause, Action::WriteNow],
+        Activity::Running { .. } => &[Action::TogglePause],
+        Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
+    };
+    let first = now.iter().filter_map(|action| Hint::of(*action)).map(|hint| going_on(hint, state));
+    let (held, first): (Vec<Hint>, Vec<Hint>) = first.partition(|_| state.work.paused);
+    urgent.extend(held);
+    let is_other =
+        |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
+    let has_picture = state.display.kind != PreviewKind::None;
+    let is_shown = |it: &&Binding| it.action != Action::PictureAlone || has_picture;
+    let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
+    // Another hint has it above, with what it takes back.
+    let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
+    let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
+    let others = KEYMAP
+        .iter()
+        .filter(is_other)
+        .filter(is_shown)
+        .filter(is_idle)
+        .filter(is_back)
+        .map(|it| Hint::new(it.label, it.hint));
+    (urgent, first.into_iter().chain(others).collect())
+}
+
+/// Keys of the list of views, or the letters typed of a name.
+fn of_views(views: &ViewList) -> Vec<Hint> {
+    match &views.name {
+        Some(name) => vec![Hint { tone: Tone::Strong, ..Hint::new("/", format!("{name}▏")) }],
+        None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]
+            .map(|(key, words)| Hint::new(key, words))
+            .into(),
+    }
+}
+
+/// These have their own places in the line.
+const ELSEWHERE: [Action; 8] = [
+    Action::Quit,
+    Action::ToggleHelp,
+    Action::ToggleDiagnostics,
+    Action::CycleShadows,
+    Action::TogglePhotons,
+    Action::ToggleDepthOfField,
+    Action::NextView,
+    Action::CycleIntegrator,
+];
+
+fn going_on(hint: Hint, state: &State) -> Hint {
+    let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
+    if is_pause && state.work.paused { Hint::new(hint.key, "go on") } else { hint }
+}
+
+/// Errors and warnings that are not in sight.
+fn unseen(state: &State) -> Option<Hint> {
+    let key = keymap::of(Action::ToggleDiagnostics)?.label;
+    let (words, tone) = match &state.overlays.problems {
+        _ if state.overlays.diagnostics.open => return None,
+        Some(_) => (super::header::errors(state), activity(state).2),
+        None => match state.reported() {
+            none if none.is_empty() => return None,
+            reported => (summary(&reported), Tone::Warning),
+        },
+    };
+    Some(Hint { tone, ..Hint::new(key, words) })
+}
+
+fn depth_of_field(state: &State) -> bool {
+    state.request.effective.as_ref().is_some_and(|it| it.dof) && state.request.overrides().dof != Some(false)
+}

@@ -1,0 +1,224 @@
+//! The layout of the screen: the picture first.
+//!
+//! The places follow from the window, the shape of the picture and `tab` alone, never from what is going on: nothing
+//! jumps while a render runs.
+
+use ratatui::layout::Rect;
+
+use crate::pipeline::protocol::{PreviewSize, Stage};
+use crate::preview_kind::PreviewKind;
+use crate::state::State;
+
+/// The areas of the screen; one that has no room is empty.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Layout {
+    /// The state and the name; the only line where the picture is alone.
+    pub header: Rect,
+    pub preview: Rect,
+    /// Stages and results, at the side of the picture or below it; empty: they are folded into `under`.
+    pub panel: Rect,
+    /// The line under the picture: a message, else progress, else what it took.
+    pub under: Rect,
+    /// The line of keys.
+    pub keys: Rect,
+    /// Area of the errors: beside the picture, else over its lower part.
+    pub pane: Rect,
+}
+
+/// The block of the state has this many columns, so that the name beside it stands still.
+pub(super) const BLOCK: usize = 13;
+/// Fewer rows than this hold one line of words beside the picture.
+const TWO_LINES: u16 = 6;
+/// Fewer rows than this hold two.
+const THREE_LINES: u16 = 14;
+/// Columns that a stage with its time and the change of it needs.
+const SIDE_WIDTH: u16 = 23;
+/// The same, and the space to the next one.
+pub(super) const ENTRY_WIDTH: u16 = 26;
+/// A panel at the side has room for half of the stages at least.
+const SIDE_HEIGHT: u16 = 4;
+/// Least share of its cells that the picture keeps beside a panel; with less there is no panel.
+const KEPT: f32 = 0.9;
+/// A panel from one of these sizes on holds errors as well: what is narrow has to be high.
+const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
+/// Rows of errors over the picture, if there are so many.
+const PANE_HEIGHT: u16 = 12;
+
+impl Layout {
+    /// For the state's window and picture.
+    pub(crate) fn of(state: &State) -> Self {
+        let shape = state.request.aspect() * state.display.window.cell_aspect;
+        let shape = (state.display.kind != PreviewKind::None).then_some(shape);
+        Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
+    }
+
+    /// The preview that the window has room for: a box of square pixels, as many in the width of a cell as are drawn.
+    pub(crate) fn preview_size(state: &State) -> Option<PreviewSize> {
+        let area = Self::of(state).preview;
+        let across = state.display.pixels_across();
+        let height =
+            (f32::from(area.height) * state.display.window.cell_aspect * across as f32).round() as u32;
+        (area.width > 0 && height > 0).then_some(PreviewSize {
+            width: u32::from(area.width) * across,
+            height,
+            around: state.picture.close_up,
+        })
+    }
+
+    /// `shape`: columns of the picture over its rows. `None` if no picture is shown.
+    fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
+        let mut layout = Self::default();
+        let mut rest = Rect::new(0, 0, columns, rows);
+        let is_alone = is_alone && shape.is_some();
+        if is_alone || rows < TWO_LINES {
+            layout.header = take_bottom(&mut rest, 1);
+        } else {
+            layout.header = take_top(&mut rest, 1);
+            layout.keys = take_bottom(&mut rest, 1);
+            layout.under = take_bottom(&mut rest, u16::from(rows >= THREE_LINES));
+        }
+        (layout.preview, layout.panel) = match shape {
+            None => (Rect::ZERO, rest),
+            Some(_) if is_alone => (rest, Rect::ZERO),
+            Some(shape) => divided(rest, shape),
+        };
+        let holds = |(width, height)| layout.panel.width >= width && layout.panel.height >= height;
+        let has_room = TEXT_SIZES.into_iter().any(holds);
+        layout.pane = if has_room { layout.panel } else { lower_part(rest) };
+        layout
+    }
+}
+
+/// The picture and the panel: where the picture gets most, or without a panel where that takes too much of it.
+fn divided(rest: Rect, shape: f32) -> (Rect, Rect) {
+    let cells = |area| {
+        let (width, height) = fit(area, shape);
+        u32::from(width) * u32::from(height)
+    };
+    let panels = [below(rest, shape), beside(rest, shape)].into_iter().flatten();
+    let best = panels.max_by_key(|(preview, _)| cells(*preview));
+    let is_kept = |(preview, _): &(Rect, Rect)| cells(*preview) as f32 >= KEPT * cells(rest) as f32;
+    best.filter(is_kept).unwrap_or((rest, Rect::ZERO))
+}
+
+fn beside(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+    let room = Rect { width: rest.width.checked_sub(SIDE_WIDTH + 1)?, ..rest };
+    let (width, _) = fit(room, shape);
+    let panel = Rect { x: rest.x + width + 1, width: rest.width - width - 1, ..rest };
+    (rest.height >= SIDE_HEIGHT).then_some((Rect { width, ..rest }, panel))
+}
+
+fn below(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+    let columns = usize::from(rest.width / ENTRY_WIDTH);
+    // The stages, and a line of results.
+    let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);
+    let room = Rect { height: rest.height.checked_sub(rows)?, ..rest };
+    let (_, height) = fit(room, shape);
+    let panel = Rect { y: rest.y + height, height: rest.height - height, ..rest };
+    (columns > 0).then_some((Rect { height, ..rest }, panel))
+}
+
+/// Columns and rows of the largest picture of this shape in an area.
+fn fit(area: Rect, shape: f32) -> (u16, u16) {
+    let rows = (f32::from(area.width) / shape).ceil();
+    if rows <= f32::from(area.height) {
+        (area.width, rows as u16)
+    } else {
+        (((f32::from(area.height) * shape).round() as u16).min(area.width), area.height)
+    }
+}
+
+fn take_bottom(rest: &mut Rect, height: u16) -> Rect {
+    let height = height.min(rest.height);
+    rest.height -= height;
+    Rect { y: rest.bottom(), height, ..*rest }
+}
+
+fn take_top(rest: &mut Rect, height: u16) -> Rect {
+    let taken = Rect { height: height.min(rest.height), ..*rest };
+    rest.y += taken.height;
+    rest.height -= taken.height;
+    taken
+}
+
+fn lower_part(rest: Rect) -> Rect {
+    let height = (rest.height / 2).max(PANE_HEIGHT).min(rest.height);
+    Rect { y: rest.bottom() - height, height, ..rest }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(columns: u16, rows: u16, aspect: f32) -> Layout {
+        Layout::new(columns, rows, Some(aspect * 2.0), false)
+    }
+
+    #[test]
+    fn the_panel_is_where_the_picture_gets_most() {
+        let four_by_three = layout(80, 24, 4.0 / 3.0);
+        assert_eq!(four_by_three.preview, Rect::new(0, 1, 56, 21));
+        assert_eq!(four_by_three.panel, Rect::new(57, 1, 23, 21));
+        assert_eq!((four_by_three.under.y, four_by_three.keys.y), (22, 23));
+        let wide = layout(80, 24, 16.0 / 9.0);
+        assert_eq!((wide.preview, wide.panel), (Rect::new(0, 1, 80, 21), Rect::ZERO));
+        let wide = layout(120, 40, 16.0 / 9.0);
+        assert_eq!((wide.preview, wide.panel), (Rect::new(0, 1, 120, 34), Rect::new(0, 35, 120, 3)));
+        let tall = layout(80, 60, 4.0 / 3.0);
+        assert_eq!((tall.preview, tall.panel), (Rect::new(0, 1, 80, 30), Rect::new(0, 31, 80, 27)));
+    }
+
+    #[test]
+    fn errors_lie_beside_the_picture_where_there_is_room() {
+        let square = layout(120, 40, 1.0);
+        assert_eq!(square.pane, square.panel);
+        let tall = layout(80, 60, 4.0 / 3.0);
+        assert_eq!(tall.pane, tall.panel);
+        assert_eq!(layout(80, 24, 16.0 / 9.0).pane, Rect::new(0, 10, 80, 12));
+        assert_eq!(layout(30, 8, 1.0).pane, Rect::new(0, 1, 30, 6));
+    }
+
+    #[test]
+    fn small_windows_give_up_lines_of_words() {
+        let lines = |rows| {
+            let layout = layout(40, rows, 4.0 / 3.0);
+            [layout.header, layout.under, layout.keys, layout.preview].map(|area| area.height)
+        };
+        assert_eq!(lines(14), [1, 1, 1, 11]);
+        assert_eq!(lines(12), [1, 0, 1, 10]);
+        assert_eq!(lines(8), [1, 0, 1, 6]);
+        assert_eq!(lines(5), [1, 0, 0, 4]);
+        assert_eq!(lines(1), [1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn alone_the_picture_has_all_but_one_line() {
+        let alone = Layout::new(80, 24, Some(2.0), true);
+        assert_eq!((alone.preview, alone.header), (Rect::new(0, 0, 80, 23), Rect::new(0, 23, 80, 1)));
+        let none = Layout::new(80, 24, None, true);
+        assert_eq!(
+            none.panel,
+            Rect::new(0, 1, 80, 21),
+            "where no picture is shown there is nothing to be alone"
+        );
+    }
+
+    #[test]
+    fn areas_lie_in_the_window_and_do_not_overlap() {
+        let shapes = [None, Some(0.1), Some(1.0), Some(2.7), Some(3.6), Some(40.0)];
+        for (columns, rows) in (0..130).flat_map(|columns| (0..60).map(move |rows| (columns, rows))) {
+            for (shape, is_alone) in shapes.into_iter().flat_map(|shape| [(shape, false), (shape, true)]) {
+                let layout = Layout::new(columns, rows, shape, is_alone);
+                let window = Rect::new(0, 0, columns, rows);
+                let areas = [layout.header, layout.preview, layout.panel, layout.under, layout.keys];
+                for (i, area) in areas.iter().enumerate() {
+                    assert_eq!(window.intersection(*area).area(), area.area(), "{area:?} in {window:?}");
+                    for other in &areas[..i] {
+                        assert_eq!(area.intersection(*other).area(), 0, "{area:?} {other:?} in {window:?}");
+                    }
+                }
+                assert_eq!(window.intersection(layout.pane).area(), layout.pane.area());
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Marks over the picture: the crosshair while a place is to be chosen, and the corners of the section that is rendered first.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::text::Tone;
+use crate::pipeline::protocol::{Section, Spot};
+use crate::preview_kind::PreviewKind;
+use crate::state::State;
+
+/// Over a picture in these cells.
+pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
+    let mut mark = |spot: Spot, symbols: [&str; 2]| {
+        let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
+        let cell = cell_of(state, spot, cells).and_then(|place| buffer.cell_mut(place));
+        if let Some(cell) = cell {
+            cell.reset();
+            cell.set_symbol(symbol).set_style(Tone::Chosen.style(state.display.depth));
+        }
+    };
+    if let Some(Section { left, top, width, height }) =
+        state.request.first_section.filter(|_| is_marked(state))
+    {
+        // A mark stands in the last cell of what it ends.
+        let (right, bottom) = (left + width * 0.999, top + height * 0.999);
+        mark(Spot { x: left, y: top }, ["┌", "+"]);
+        mark(Spot { x: right, y: top }, ["┐", "+"]);
+        mark(Spot { x: left, y: bottom }, ["└", "+"]);
+        mark(Spot { x: right, y: bottom }, ["┘", "+"]);
+    }
+    if state.selection.is_focusing
+        || state.selection.is_marking && state.request.first_section.is_none()
+        || state.selection.facts.is_some()
+    {
+        mark(state.selection.crosshair, ["┼", "+"]);
+    }
+}
+
+/// The rectangle is marked while it matters.
+fn is_marked(state: &State) -> bool {
+    state.selection.is_marking || state.work.is_running()
+}
+
+/// The cell of a place of the picture, if that is in sight.
+fn cell_of(state: &State, spot: Spot, cells: Rect) -> Option<(u16, u16)> {
+    let section = state.picture.shown.as_ref().and_then(|shown| shown.section);
+    let Section { left, top, width, height } =
+        section.unwrap_or(Section { left: 0.0, top: 0.0, width: 1.0, height: 1.0 });
+    let along = |at: f64, start: f64, length: f64, cells: u16| {
+        let share = (at - start) / length;
+        (0.0..1.0).contains(&share).then(|| ((share * f64::from(cells)) as u16).min(cells.saturating_sub(1)))
+    };
+    let column = along(spot.x, left, width, cells.width)?;
+    let row = along(spot.y, top, height, cells.height)?;
+    (!cells.is_empty()).then_some((cells.x + column, cells.y + row))
+}

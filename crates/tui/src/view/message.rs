@@ -1,0 +1,124 @@
+//! The message to the user, and what was found at a place. Under the image, a message shares the line with progress or results;
+//! where it is too long for that, it covers the last rows of the image. Without such a line it takes the line of keys, or the first
+//! one.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::{Clear, Widget};
+
+use super::layout::Layout;
+use super::text::{Tone, columns, put, rest, row, wrapped};
+use super::under;
+use crate::scene::sanitize::visible;
+use crate::state::State;
+
+/// Rows that a panel needs to hold what was found at a place.
+const FACTS: u16 = 10;
+/// Columns between a message and what shares its line.
+const GAP: u16 = 2;
+
+/// Place of a message.
+enum Spot {
+    /// In one line.
+    Line(Rect),
+    /// Over the last rows of these.
+    Over(Rect),
+}
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let Some((words, tone)) = words(state, layout) else { return };
+    let room = match spot(state, layout, &words) {
+        Spot::Line(line) => {
+            Clear.render(line.intersection(buffer.area), buffer);
+            put(buffer, line, &[(&words, tone)], state.display.depth);
+            return;
+        }
+        Spot::Over(room) => room,
+    };
+    let lines = wrapped(&words, usize::from(room.width));
+    let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height);
+    let area = Rect { y: room.bottom() - height, height, ..room };
+    Clear.render(area.intersection(buffer.area), buffer);
+    for (index, line) in (0..height).zip(&lines) {
+        // What there is no row for is cut with a mark.
+        let is_cut = index + 1 == height && lines.len() > usize::from(height);
+        let rest = if is_cut { lines[usize::from(index)..].join(" ") } else { line.clone() };
+        put(buffer, row(area, index), &[(&rest, tone)], state.display.depth);
+    }
+}
+
+/// Whether a message takes a line from whatever else is shown there. The line under the image is shared instead.
+pub(super) fn is_said(state: &State, layout: &Layout) -> bool {
+    words(state, layout).is_some()
+}
+
+/// The part of the line under the image that a message leaves.
+pub(super) fn left_under(state: &State, layout: &Layout) -> Rect {
+    let spot = words(state, layout).map(|(words, _)| spot(state, layout, &words));
+    let used = match spot {
+        Some(Spot::Line(line)) if line.y == layout.under.y => line.width + GAP,
+        Some(Spot::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
+        Some(Spot::Line(_) | Spot::Over(_)) | None => 0,
+    };
+    rest(layout.under, used)
+}
+
+/// Whether it lies over the image.
+pub(super) fn is_over_picture(state: &State) -> bool {
+    let layout = Layout::of(state);
+    words(state, &layout).is_some_and(|(words, _)| matches!(spot(state, &layout, &words), Spot::Over(_)))
+}
+
+/// Whether the panel has room for what was found at a place.
+pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
+    let is_covered = state.overlays.diagnostics.open && layout.pane == layout.panel;
+    layout.panel.height >= FACTS && !is_covered
+}
+
+fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
+    if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(state, layout)) {
+        return Some((facts.join(" · "), Tone::Strong));
+    }
+    let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
+    let words = visible(&message.words).into_owned();
+    // The list of views lies where a long one would, and its keys where a short one would without a line of its own.
+    let has_place = !layout.under.is_empty() && matches!(spot(state, layout, &words), Spot::Line(_));
+    if state.overlays.views.is_some() && !has_place {
+        return None;
+    }
+    let tone = if words.starts_with("error") { Tone::Error } else { Tone::Strong };
+    Some((words, tone))
+}
+
+fn spot(state: &State, layout: &Layout, words: &str) -> Spot {
+    let width = columns(words);
+    let under = layout.under;
+    if under.is_empty() {
+        // The block of the state stays in sight.
+        let beside = rest(layout.header, super::layout::BLOCK as u16 + 1);
+        let line = if layout.keys.is_empty() { beside } else { layout.keys };
+        let fits = width <= line.width && !line.is_empty();
+        return if fits { Spot::Line(line) } else { Spot::Over(with_rows_above(layout, line)) };
+    }
+    let needed = match under::least_columns(state, layout) {
+        0 => 0,
+        needed => needed + GAP,
+    };
+    if width.saturating_add(needed) <= under.width {
+        return Spot::Line(Rect { width, ..under });
+    }
+    let room = with_rows_above(layout, under);
+    let above = Rect { height: room.height.saturating_sub(under.height), ..room };
+    Spot::Over(if needed == 0 || above.is_empty() { room } else { above })
+}
+
+/// A line and the rows above it that a longer message may take.
+fn with_rows_above(layout: &Layout, line: Rect) -> Rect {
+    // The union with an empty area would reach to its corner.
+    let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());
+    let rest = areas.reduce(Rect::union).unwrap_or(line);
+    if line.y == layout.header.y {
+        return rest;
+    }
+    Rect { height: line.y + 1 - rest.y.min(line.y), y: rest.y.min(line.y), x: line.x, width: line.width }
+}

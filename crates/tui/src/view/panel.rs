@@ -1,0 +1,215 @@
+//! The panel beside or below the picture: stages and loading assets while they are at work, then what came out.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+use super::drawn::Drawn;
+use super::layout::{ENTRY_WIDTH, Layout};
+use super::message;
+use super::spare;
+use super::stages::{self, Line};
+use super::text::{Tone, bytes, columns, gauge, percent, row, share, shortened, wrapped};
+use super::under;
+use crate::pipeline::protocol::Stage;
+use crate::preview_kind::PreviewKind;
+use crate::scene::sanitize::visible;
+use crate::state::{Activity, AssetBar, State};
+
+/// Columns of a bar.
+const BAR: u16 = 8;
+/// Columns of what a result is.
+const LABEL: usize = 8;
+
+/// In as many columns as there have to be and can be; what does not fit is left out at the end.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> Drawn {
+    if area.is_empty() {
+        return Drawn::default();
+    }
+    let Arranged { lines, columns, room } = arranged(state, area);
+    let width = room.width / columns;
+    let mut drawn = Drawn::default();
+    for (index, line) in (0..).zip(lines.iter()) {
+        let (column, line_of) = (index / room.height, index % room.height);
+        if column >= columns {
+            break;
+        }
+        let gap = u16::from(column + 1 < columns);
+        let place = Rect { x: room.x + column * width, width: width - gap, ..room };
+        drawn.put(state, row(place, line_of), line, buffer);
+    }
+    drawn.later = spare::draw(state, area, rows(&lines, columns, room), buffer);
+    drawn
+}
+
+/// The picture of the strip at a cell.
+pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
+    let Arranged { lines, columns, room } = arranged(state, area);
+    spare::picture_at(state, area, rows(&lines, columns, room), place)
+}
+
+/// Lines in a panel, the number of their columns, and the cells that these may take.
+struct Arranged {
+    lines: Vec<Line>,
+    columns: u16,
+    room: Rect,
+}
+
+fn arranged(state: &State, area: Rect) -> Arranged {
+    let room = Rect { width: spare::columns_of_lines(state, area), ..area };
+    let is_one_column = |lines: &[Line]| lines.len() <= usize::from(room.height);
+    let mut lines = lines(state, (room.width, room.width), true);
+    if !is_one_column(&lines) {
+        lines = self::lines(state, (room.width, room.width), false);
+    }
+    let mut room = room;
+    if !is_one_column(&lines) {
+        room = area;
+        lines = self::lines(state, (room.width, room.width.min(ENTRY_WIDTH)), false);
+    }
+    let wanted = lines.len().div_ceil(usize::from(room.height.max(1)));
+    let columns = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (room.width / ENTRY_WIDTH).max(1));
+    Arranged { lines, columns, room }
+}
+
+/// Rows that lines take; all of them if there are several columns.
+fn rows(lines: &[Line], columns: u16, room: Rect) -> u16 {
+    if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
+}
+
+/// The lines of a panel of this width, the hint wrapped to a column. With the reasons of stages in full, or with what fits of them beside the stages.
+fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Line> {
+    let is_done = matches!(state.work.activity, Activity::Done);
+    let mut lines = inspected(state, width);
+    // The stages and results are not those of an older picture.
+    if state.picture.history.is_open() {
+        return lines;
+    }
+    // The stages of a broken scene are of nothing that is to be seen.
+    if !is_done && !is_broken(state) {
+        let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
+        lines.extend(Stage::ALL.into_iter().flat_map(of));
+    }
+    if is_done {
+        lines.extend(results(state, column));
+    }
+    lines.extend(hint(state, column));
+    // Bars come and go: nothing is below them.
+    lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
+    lines
+}
+
+/// Facts about a place.
+fn inspected(state: &State, width: u16) -> Vec<Line> {
+    let facts =
+        state.selection.facts.iter().filter(|_| message::is_in_panel(state, &Layout::of(state))).flatten();
+    let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
+    let mut lines: Vec<Line> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
+    if !lines.is_empty() {
+        lines.push(Line::new());
+    }
+    lines
+}
+
+/// Whether the scene as it is now cannot be read.
+fn is_broken(state: &State) -> bool {
+    let is_at_rest = match state.work.activity {
+        Activity::Waiting | Activity::Broken => true,
+        Activity::Running { .. } | Activity::Done | Activity::Cancelled => false,
+    };
+    is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
+}
+
+fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
+    let fraction = stages::fraction(asset);
+    let (filled, empty) = gauge(fraction, BAR, state.display.kind == PreviewKind::Ascii);
+    let percent = format!(" {:3} %", percent(fraction));
+    let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + columns(&percent) + 1);
+    let name = shortened(&visible(&asset.progress.name), room);
+    let pad = usize::from(room - columns(&name).min(room)) + 1;
+    let name = name + &" ".repeat(pad);
+    vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
+}
+
+/// Results in this many columns: a label and a value in each line.
+fn results(state: &State, width: u16) -> Vec<Line> {
+    let fact =
+        |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
+    let mut lines = Vec::new();
+    lines.extend(state.saving.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
+    let mut add = |words: &str, tone| {
+        lines.extend(wrapped(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
+    };
+    under::not_saved(state).iter().for_each(|words| add(words, Tone::Faint));
+    under::lost(state).for_each(|words| add(&words, Tone::Warning));
+    for written in under::files(state) {
+        let name = visible(&written.path.to_string_lossy()).into_owned();
+        lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);
+        let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
+        lines.push(vec![(format!("  {}{}", bytes(written.bytes), size.unwrap_or_default()), Tone::Faint)]);
+    }
+    if let Some(report) = &state.work.report {
+        let samples = report.image.samples;
+        lines.push(fact(
+            "samples",
+            if samples.min == samples.max {
+                samples.max.to_string()
+            } else {
+                format!("{} to {}", samples.min, samples.max)
+            },
+        ));
+        lines.extend(report.image.error.map(|error| fact("noise", format!("{} in all", share(error)))));
+        lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
+            let sign = if end(state) == Some(RenderEnd::Error) { " ✓" } else { "" };
+            fact("asked", format!("{} % a tile{sign}", f64::from((it.error * 1e4).round()) / 100.0))
+        }));
+    }
+    match end(state) {
+        Some(RenderEnd::Time) => lines.push(fact("ended by", "time".to_owned())),
+        Some(RenderEnd::Samples) => lines.push(fact("ended by", "samples".to_owned())),
+        Some(RenderEnd::Error) | None => {}
+    }
+    lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
+    lines
+}
+
+/// The first limit that a render met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum RenderEnd {
+    Time,
+    Samples,
+    /// Every tile has the `error` asked for.
+    Error,
+}
+
+/// The limit that ended the render. `None` if there is but one.
+fn end(state: &State) -> Option<RenderEnd> {
+    let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
+    let is_by_error = effective.error > 0.0;
+    match () {
+        () if !is_by_error && state.request.command_line.time_seconds.is_none() => None,
+        () if !image.complete => Some(RenderEnd::Time),
+        // Tiles with as many samples as there may be are perhaps not there yet.
+        () if is_by_error && image.samples.max < effective.samples => Some(RenderEnd::Error),
+        () => Some(RenderEnd::Samples),
+    }
+}
+
+/// The hint for a user who has not saved yet, broken between words. A broken scene without an image has it in the line below.
+fn hint(state: &State, width: u16) -> Vec<Line> {
+    if is_broken(state) && state.picture.shown.is_none() {
+        return Vec::new();
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for word in under::hint(state).split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if columns(line) + 1 + columns(word) <= width => {
+                *line += &format!(" {word}");
+            }
+            Some(_) | None => lines.push(word.to_owned()),
+        }
+    }
+    if !lines.is_empty() {
+        lines.insert(0, String::new());
+    }
+    lines.into_iter().map(|line| vec![(line, Tone::Faint)]).collect()
+}

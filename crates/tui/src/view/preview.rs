@@ -1,0 +1,343 @@
+//! The picture in blocks or characters: the one place where pixels become cells.
+
+use ratatui::buffer::{Buffer, Cell};
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Style};
+
+use super::layout::Layout;
+use super::marks;
+use super::message;
+use super::ramp::Ramp;
+use super::text::{Tone, put};
+use crate::color::{ColorDepth, Shades, XTERM};
+use crate::film::Picture;
+use crate::graphics::Placement;
+use crate::history::Shown;
+use crate::mosaic::{Grid, fit};
+use crate::options::PreviewChoice;
+use crate::pipeline::protocol::Spot;
+use crate::preview_kind::PreviewKind;
+use crate::rescale::rescaled;
+use crate::state::State;
+
+/// The picture of the state, or a word in its place.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+    let area = area.intersection(buffer.area);
+    match &state.picture.shown {
+        Some(_) if is_in_pixels(state) => {}
+        Some(shown) => {
+            let kind = in_cells(state.display.kind, state.display.depth);
+            let placed = Placed::of(state, shown, area, kind);
+            placed.draw(&shown.picture, kind, Inks::of(state), buffer);
+            marks::draw(state, placed.cells, buffer);
+        }
+        None if state.overlays.problems.is_none() && area.height > 0 => {
+            let text = "no picture yet";
+            let middle = Rect { y: area.y + area.height / 2, height: 1, ..area };
+            let indent = area.width.saturating_sub(super::text::columns(text)) / 2;
+            let line = Rect { x: middle.x + indent, width: middle.width - indent, ..middle };
+            put(buffer, line, &[(text, Tone::Faint)], state.display.depth);
+        }
+        None => {}
+    }
+}
+
+/// A small picture beside the words.
+pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
+    let area = area.intersection(buffer.area);
+    if !area.is_empty() {
+        let kind = in_cells(state.display.kind, state.display.depth);
+        let placed = Placed::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
+        placed.draw(picture, kind, Inks::of(state), buffer);
+    }
+}
+
+/// The place of the picture that a cell shows.
+pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
+    let shown = state.picture.shown.as_ref()?;
+    let area = Layout::of(state).preview;
+    let cells = Placed::of(state, shown, area, in_cells(state.display.kind, state.display.depth)).cells;
+    let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
+    let spot = || {
+        let spot = Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
+        shown.section.map_or(spot, |section| section.place(spot))
+    };
+    cells.contains((column, row).into()).then(spot)
+}
+
+/// Kind of preview when the picture has to be in cells.
+fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
+    match kind {
+        PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
+        kind => kind,
+    }
+}
+
+/// Whether the picture is drawn in pixels: where nothing may lie over it.
+fn is_in_pixels(state: &State) -> bool {
+    matches!(state.display.kind, PreviewKind::Pixels(_))
+        && !state.overlays.help.open
+        && !state.overlays.diagnostics.open
+        && state.overlays.views.is_none()
+        && !message::is_over_picture(state)
+}
+
+/// Placement of the picture in pixels. `None` if it is drawn in cells.
+pub(crate) fn placement(state: &State, area: Rect) -> Option<Placement> {
+    let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
+    let placed = Placed::of(state, shown, area, state.display.kind);
+    let (picture, cells) = (shown.picture.clone(), placed.cells);
+    (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.display.window.cell_pixels })
+}
+
+/// Colours that show a picture.
+#[derive(Clone, Copy)]
+pub(crate) struct Inks<'a> {
+    pub(crate) depth: ColorDepth,
+    pub(crate) shades: &'a Shades,
+    /// Whether the terminal's background is.
+    pub(crate) is_light: bool,
+}
+
+impl<'a> Inks<'a> {
+    fn of(state: &'a State) -> Self {
+        Self { depth: state.display.depth, shades: &state.display.shades, is_light: state.display.is_light }
+    }
+}
+
+/// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colours of xterm.
+pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
+    let shades = Shades::new(depth, &XTERM);
+    let inks = Inks { depth, shades: &shades, is_light: false };
+    shown_by(picture, choice, inks, (area, 2.0))
+}
+
+/// The same with these inks, where cells are of another aspect ratio.
+pub(crate) fn shown_by(
+    picture: &Picture,
+    choice: PreviewChoice,
+    inks: Inks<'_>,
+    (area, cell_aspect): (Rect, f32),
+) -> Buffer {
+    let mut buffer = Buffer::empty(area);
+    let kind = in_cells(PreviewKind::of(choice, inks.depth), inks.depth);
+    Placed::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
+    buffer
+}
+
+/// Columns and rows of a picture in half blocks or in characters, within those available.
+pub(crate) fn size_in_cells(
+    picture: &Picture,
+    depth: ColorDepth,
+    (columns, rows): (u16, u16),
+    cell_aspect: f32,
+) -> (u16, u16) {
+    let kind = PreviewKind::of(PreviewChoice::HalfBlock, depth);
+    let area = Rect::new(0, 0, columns, rows);
+    let cells = Placed::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
+    (cells.width, cells.height)
+}
+
+/// Placement of a picture: its cells, and its pixels there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Placed {
+    cells: Rect,
+    width: u32,
+    height: u32,
+}
+
+impl Placed {
+    /// Placement of the state's picture: as large as there is room for, or pixel by pixel.
+    fn of(state: &State, shown: &Shown, area: Rect, kind: PreviewKind) -> Self {
+        let across = kind.grid().map_or(1, Grid::columns);
+        let one_to_one = across as f32 / state.display.pixels_across() as f32;
+        let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
+        Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
+    }
+
+    /// The largest place in the middle of the area with the picture's aspect ratio. `cell_aspect` is the height
+    /// of a cell over its width, `most` the most parts of a cell that a pixel is wide.
+    fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
+        let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
+        let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
+        let room = (f32::from(area.width * across), f32::from(area.height * down));
+        let size = (picture.width.max(1) as f32, picture.height.max(1) as f32 / pixel_aspect);
+        let scale = (room.0 / size.0).min(room.1 / size.1).min(most);
+        let whole = |length: f32, room: f32| (length * scale).round().clamp(room.min(1.0), room) as u16;
+        let (width, height) = (whole(size.0, room.0), whole(size.1, room.1));
+        let (columns, rows) = (width.div_ceil(across), height.div_ceil(down));
+        // Of several pixels in a cell, the last cells are whole.
+        let (width, height) = if across > 1 { (columns * across, rows * down) } else { (width, height) };
+        let cells = Rect {
+            x: area.x + (area.width - columns.min(area.width)) / 2,
+            y: area.y + (area.height - rows.min(area.height)) / 2,
+            width: columns,
+            height: rows,
+        };
+        Self { cells, width: u32::from(width), height: u32::from(height) }
+    }
+
+    fn draw(self, picture: &Picture, kind: PreviewKind, inks: Inks<'_>, buffer: &mut Buffer) {
+        let pixels = rescaled(picture, self.width, self.height);
+        let scaled = Scaled { width: self.width, height: self.height, pixels: &pixels };
+        let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
+            for row in 0..self.cells.height {
+                for column in 0..self.cells.width {
+                    if let Some(cell) = buffer.cell_mut((self.cells.x + column, self.cells.y + row)) {
+                        draw(usize::from(column), usize::from(row), cell);
+                    }
+                }
+            }
+        };
+        match kind.grid() {
+            Some(grid) => each(&|x, y, cell| mosaic(&scaled, grid, inks.shades, (x, y), cell)),
+            None if kind == PreviewKind::None => {}
+            None => {
+                let ramp = Ramp::of(picture, inks.is_light);
+                each(&|x, y, cell| character(&scaled, ramp, inks, (x, y), cell));
+            }
+        }
+    }
+}
+
+/// A picture of the size at which it is drawn.
+struct Scaled<'a> {
+    width: u32,
+    height: u32,
+    pixels: &'a [[u8; 3]],
+}
+
+impl Scaled<'_> {
+    fn pixel(&self, x: u32, y: u32) -> Option<[u8; 3]> {
+        let index = (y < self.height).then(|| y as usize * self.width as usize + x as usize)?;
+        self.pixels.get(index).copied()
+    }
+}
+
+/// A cell in two colours.
+fn mosaic(scaled: &Scaled<'_>, grid: Grid, shades: &Shades, (x, y): (usize, usize), cell: &mut Cell) {
+    let (left, top) = (x as u32 * grid.columns(), y as u32 * grid.rows());
+    let part = |i: u32| scaled.pixel(left + i % grid.columns(), top + i / grid.columns());
+    let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();
+    let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
+    if colors.len() < parts.len() {
+        // The last row of cells has no picture below.
+        let color = parts[0].map_or(Color::Reset, |rgb| shades.color(rgb, x, 2 * y));
+        cell.set_symbol("▀").set_style(Style::new().fg(color).bg(Color::Reset));
+        return;
+    }
+    let shown = shades.cell(fit(grid, &colors), x, y);
+    let [first, second] = shown.pair;
+    cell.set_char(shown.tile.symbols()[0]).set_style(Style::new().fg(first).bg(second));
+}
+
+/// A cell as a character.
+fn character(scaled: &Scaled<'_>, ramp: Ramp, inks: Inks<'_>, (x, y): (usize, usize), cell: &mut Cell) {
+    let Some(rgb) = scaled.pixel(x as u32, y as u32) else { return };
+    if inks.depth == ColorDepth::None {
+        cell.set_char(ramp.glyph(rgb));
+    } else {
+        let (symbol, ink) = ramp.tinted(rgb);
+        cell.set_char(symbol).set_style(Style::new().fg(inks.shades.color(ink, x, y)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::state;
+
+    fn picture(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> Picture {
+        let pixels =
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
+        Picture { width, height, pixels }
+    }
+
+    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> Placed {
+        Placed::fit(
+            &picture(width, height, |_, _| [0; 3]),
+            Rect::new(3, 1, area.0, area.1),
+            kind,
+            aspect,
+            f32::INFINITY,
+        )
+    }
+
+    #[test]
+    fn a_picture_of_the_size_asked_for_is_not_scaled() {
+        let placed = fit(50, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
+        assert_eq!(placed, Placed { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
+        let narrow = fit(20, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
+        assert_eq!(narrow.cells, Rect::new(18, 1, 20, 20));
+        let odd = fit(50, 31, (50, 20), PreviewKind::HalfBlock, 2.0);
+        assert_eq!(odd, Placed { cells: Rect::new(3, 3, 50, 16), width: 50, height: 31 });
+    }
+
+    #[test]
+    fn the_aspect_is_kept_in_every_area() {
+        for (columns, rows) in [(80_u16, 24_u16), (51, 20), (150, 55), (200, 20), (30, 60)] {
+            for (width, height) in [(640, 480), (100, 300), (1920, 1080), (64, 64)] {
+                for (kind, across, per_cell) in [
+                    (PreviewKind::HalfBlock, 1.0, 2.0),
+                    (PreviewKind::Ascii, 1.0, 1.0),
+                    (PreviewKind::Quadrant, 2.0, 2.0),
+                    (PreviewKind::Sextant, 2.0, 6.0),
+                    (PreviewKind::Octant, 2.0, 4.0),
+                ] {
+                    for aspect in [1.8_f32, 2.0, 2.3] {
+                        let placed = fit(width, height, (columns, rows), kind, aspect);
+                        let shown_height = placed.height as f32 * aspect / per_cell;
+                        let shown_width = placed.width as f32 / across;
+                        // Half a pixel of rounding on each side; where a cell has several, up to a cell.
+                        let is_fine = across > 1.0;
+                        let (off_x, off_y) =
+                            if is_fine { (1.0, aspect) } else { (0.5, 0.5 * aspect / per_cell) };
+                        let wanted = width as f32 / height as f32;
+                        let low = (shown_width - off_x) / (shown_height + off_y);
+                        let high = (shown_width + off_x) / (shown_height - off_y);
+                        assert!(low <= wanted && wanted <= high, "{placed:?} for {width}×{height}");
+                        assert!(
+                            placed.cells.width == columns || placed.cells.height == rows,
+                            "{placed:?} leaves room"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_odd_last_row_leaves_the_lower_half_to_the_background() {
+        let one = picture(2, 1, |_, _| [9, 8, 7]);
+        let state = state(2, 3);
+        let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
+        Placed::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
+            &one,
+            PreviewKind::HalfBlock,
+            Inks::of(&state),
+            &mut buffer,
+        );
+        let cell = &buffer[(0, 1)];
+        assert_eq!((cell.symbol(), cell.fg, cell.bg), ("▀", Color::Rgb(9, 8, 7), Color::Reset));
+    }
+
+    #[test]
+    fn an_edge_between_the_columns_of_a_cell_is_shown_by_quadrants() {
+        let sharp = picture(8, 8, |x, _| if x < 3 { [200, 20, 20] } else { [20, 20, 200] });
+        let state = state(4, 2);
+        for (kind, symbol) in
+            [(PreviewKind::Quadrant, "▌"), (PreviewKind::Sextant, "▌"), (PreviewKind::Octant, "▌")]
+        {
+            let mut buffer = Buffer::empty(Rect::new(0, 0, 4, 2));
+            Placed::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
+                &sharp,
+                kind,
+                Inks::of(&state),
+                &mut buffer,
+            );
+            let cell = &buffer[(1, 1)];
+            let colors = (cell.symbol(), cell.fg, cell.bg);
+            assert_eq!(colors, (symbol, Color::Rgb(200, 20, 20), Color::Rgb(20, 20, 200)), "{kind:?}");
+        }
+    }
+}

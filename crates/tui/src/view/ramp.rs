@@ -1,0 +1,167 @@
+//! The picture in characters: each as bright as its ink makes it.
+
+use crate::film::Picture;
+use crate::math::Vec3;
+use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
+
+/// Characters with the part of a cell that their ink covers, as measured on DejaVu Sans Mono; other fonts differ by a
+/// few percent of the most. All are punctuation, which tells them from words.
+const RAMP: [(char, f32); 15] = [
+    (' ', 0.0),
+    ('.', 0.027),
+    (',', 0.043),
+    (':', 0.055),
+    ('^', 0.069),
+    ('!', 0.085),
+    ('*', 0.095),
+    ('+', 0.108),
+    ('?', 0.124),
+    ('[', 0.140),
+    ('{', 0.155),
+    ('%', 0.181),
+    ('$', 0.211),
+    ('&', 0.233),
+    ('@', 0.267),
+];
+const MOST_INK: f32 = RAMP[RAMP.len() - 1].1;
+
+/// Mapping of brightness to ink.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ramp {
+    /// The values shown as black and as white, in sRGB.
+    low: f32,
+    high: f32,
+    /// Whether the terminal's background is lighter than its foreground.
+    is_light: bool,
+}
+
+impl Ramp {
+    /// For a picture: from its darkest to its brightest, but for a thirtieth of it at each end: lamps. In steps, so that noise does
+    /// not turn all the characters, and no more than stretched by four.
+    pub(super) fn of(picture: &Picture, is_light: bool) -> Self {
+        const STEPS: f32 = 16.0;
+        const LEAST: f32 = 0.25;
+        let mut counts = [0_usize; 256];
+        for pixel in &picture.pixels {
+            let level = linear_to_srgb8(luminance(srgb8_to_linear(*pixel)));
+            counts[usize::from(level)] += 1;
+        }
+        let beyond = picture.pixels.len() / 30;
+        let low = (end(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
+        let high = (end(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
+        let (low, high) =
+            if high - low < LEAST { (high.min(1.0) - LEAST, high.min(1.0)) } else { (low, high) };
+        Self { low: low.max(0.0), high, is_light }
+    }
+
+    /// Brightness, in sRGB, as far as it is shown.
+    fn stretched(self, brightness: f32) -> f32 {
+        ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
+    }
+
+    /// The character for a colour, if there is only one ink.
+    pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
+        self.nearest(self.stretched(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
+    }
+
+    /// The character for a colour and its ink: as saturated as that allows, so that much of it is covered.
+    pub(super) fn tinted(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
+        let linear = srgb8_to_linear(rgb);
+        if self.is_light {
+            let ink = (1.0 - linear.min_element()).max(1e-3);
+            let brightness = self.stretched(linear_to_srgb(1.0 - ink));
+            (self.nearest(brightness), coarse(Vec3::ONE - (Vec3::ONE - linear) / ink))
+        } else {
+            let brightest = linear.max_element().max(1e-3);
+            (self.nearest(self.stretched(linear_to_srgb(brightest))), coarse(linear / brightest))
+        }
+    }
+
+    /// The character that comes nearest to a brightness in sRGB. All of the background is one end, as much of the
+    /// foreground as a character has the other.
+    fn nearest(self, brightness: f32) -> char {
+        let off = |ink: f32| {
+            let covered = ink / MOST_INK;
+            // A little less than white is about as much darker as it is less.
+            let seen = if self.is_light { 1.0 - covered } else { linear_to_srgb(covered) };
+            (seen - brightness).abs()
+        };
+        RAMP.iter().min_by(|a, b| off(a.1).total_cmp(&off(b.1))).map_or(' ', |(symbol, _)| *symbol)
+    }
+}
+
+/// The first of these levels that has more than so many pixels with those before.
+fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
+    let mut seen = 0;
+    let level = levels.find(|level| {
+        seen += counts[*level];
+        seen > beyond
+    });
+    level.unwrap_or_default() as f32 / 255.0
+}
+
+/// The colour in 5 bits of a channel: what noise changes is not drawn again.
+fn coarse(linear: Vec3) -> [u8; 3] {
+    linear.to_array().map(|channel| {
+        let level = linear_to_srgb8(channel) >> 3;
+        level << 3 | level >> 2
+    })
+}
+
+/// Whether a background is light: nearer to white than to black as it looks.
+pub(crate) fn is_light(rgb: [u8; 3]) -> bool {
+    luminance(srgb8_to_linear(rgb)) > srgb_to_linear(0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FULL: Ramp = Ramp { low: 0.0, high: 1.0, is_light: false };
+
+    fn rank(symbol: char) -> usize {
+        RAMP.iter().position(|(other, _)| *other == symbol).expect("one of the ramp")
+    }
+
+    #[test]
+    fn more_light_is_more_ink_on_black_and_less_on_white() {
+        let light = Ramp { is_light: true, ..FULL };
+        assert_eq!((FULL.glyph([0; 3]), FULL.glyph([255; 3])), (' ', '@'));
+        assert_eq!((light.glyph([0; 3]), light.glyph([255; 3])), ('@', ' '));
+        for level in 0..255 {
+            assert!(rank(FULL.glyph([level; 3])) <= rank(FULL.glyph([level + 1; 3])));
+            assert!(rank(light.glyph([level; 3])) >= rank(light.glyph([level + 1; 3])));
+        }
+        assert!(rank(FULL.glyph([0, 255, 0])) > rank(FULL.glyph([0, 0, 255])));
+        assert!(RAMP.iter().all(|(symbol, _)| *symbol == ' ' || symbol.is_ascii_punctuation()));
+    }
+
+    #[test]
+    fn a_dull_picture_is_stretched_and_noise_does_not_move_the_ends() {
+        let dull = |noise: u8| {
+            let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
+            Picture { width: 100, height: 10, pixels }
+        };
+        let ramp = Ramp::of(&dull(0), false);
+        assert!(rank(ramp.glyph([80; 3])) < 3 && rank(ramp.glyph([139; 3])) > 11, "{ramp:?}");
+        assert_eq!(ramp, Ramp::of(&dull(2), false));
+        let flat = Ramp::of(&Picture { width: 10, height: 1, pixels: vec![[128; 3]; 10] }, false);
+        assert!((flat.high - flat.low - 0.25).abs() < 1e-6);
+    }
+
+    #[test]
+    fn ink_has_the_hue_and_the_character_the_rest() {
+        assert_eq!(FULL.tinted([128, 0, 0]).1, [255, 0, 0]);
+        assert!(rank(FULL.tinted([128, 0, 0]).0) < rank(FULL.tinted([255, 0, 0]).0));
+        let light = Ramp { is_light: true, ..FULL };
+        // Pale red is little ink of pure red.
+        let (symbol, ink) = light.tinted([255, 200, 200]);
+        assert_eq!(ink, [255, 0, 0]);
+        assert!(rank(symbol) < 11 && rank(symbol) > 0, "{symbol}");
+    }
+
+    #[test]
+    fn backgrounds_are_light_or_dark() {
+        assert!(is_light([255; 3]) && is_light([253, 246, 227]) && !is_light([0, 43, 54]));
+    }
+}

@@ -1,0 +1,156 @@
+//! The stages: a line for each while they are at work, one for all of them when they are done.
+
+use super::text::{Tone, columns, counted, delta, seconds, shortened, wrapped};
+use crate::pipeline::protocol::{Stage, StageReport, Status};
+use crate::scene::sanitize::visible;
+use crate::state::{AssetBar, State};
+
+/// Pieces of text with their tones.
+pub(super) type Line = Vec<(String, Tone)>;
+
+/// Stages that took less of the whole time than this are left out of the one line.
+const SMALL: f64 = 0.02;
+/// Columns of a name and a time with the gap between them.
+const TIME_ENDS: u16 = 16;
+/// Fewer columns of a reason say nothing.
+const LEAST_WHY: u16 = 12;
+
+/// Sign, name, time, its change, and the reason; in lines of its own if there is no room beside them.
+pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
+    let mut line = figures(state, stage, room);
+    let why = why(state, stage);
+    if why.is_empty() {
+        return vec![line];
+    }
+    if columns(&why) <= beside(&line, room) {
+        line.push((format!("  {why}"), Tone::Faint));
+        return vec![line];
+    }
+    let below = wrapped(&why, usize::from(room.saturating_sub(2)));
+    let below = below.into_iter().map(|words| vec![(format!("  {words}"), Tone::Faint)]);
+    std::iter::once(line).chain(below).collect()
+}
+
+/// The same in one line, as far as there is room.
+pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<Line> {
+    let mut line = figures(state, stage, room);
+    let (why, room) = (why(state, stage), beside(&line, room));
+    if !why.is_empty() && (room >= LEAST_WHY || columns(&why) <= room) {
+        line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
+    }
+    vec![line]
+}
+
+/// Columns for a reason beside a stage.
+fn beside(line: &Line, room: u16) -> u16 {
+    room.saturating_sub(width(line) + 2)
+}
+
+fn width(line: &Line) -> u16 {
+    line.iter().map(|(text, _)| columns(text)).sum()
+}
+
+fn why(state: &State, stage: Stage) -> String {
+    let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
+    visible(report.map_or("", |report| report.why.as_str())).into_owned()
+}
+
+/// Sign, name, time, and its change if there is room.
+fn figures(state: &State, stage: Stage, room: u16) -> Line {
+    let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
+    let has_ended = !state.work.is_running();
+    let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
+        None => ("·", Tone::Faint, String::new()),
+        Some((Status::Running, _)) if has_ended => ("✗", Tone::Error, "stopped".to_owned()),
+        Some((Status::Running, _)) => (">", Tone::Working, "…".to_owned()),
+        Some((Status::Done, time)) => ("✓", Tone::Good, seconds(time)),
+        Some((Status::Reused, _)) => ("=", Tone::Faint, "reused".to_owned()),
+        Some((Status::Skipped, _)) => ("-", Tone::Faint, "skipped".to_owned()),
+    };
+    let text_tone = if tone == Tone::Faint { Tone::Faint } else { weight(state, report) };
+    let line = |gap: u16| {
+        let (name, gap) = (stage.name(), usize::from(gap));
+        vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
+    };
+    // The time ends in the same column everywhere, unless the change needs the gap.
+    let used = columns(stage.name()) + columns(&time);
+    let usual = TIME_ENDS.saturating_sub(used).max(1);
+    let change = report.map_or(String::new(), |report| change(state, report));
+    let change = if change.is_empty() { change } else { format!(" {change}") };
+    let least = 2 + used + 1 + columns(&change);
+    if change.is_empty() || least > room {
+        return line(usual);
+    }
+    let mut line = line(usual.min(1 + room - least));
+    line.push((change, Tone::Strong));
+    line
+}
+
+/// Bold for what an edit made again.
+fn weight(state: &State, report: Option<&StageReport>) -> Tone {
+    let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
+    if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }
+}
+
+/// Against the last time that the stage was at work.
+fn change(state: &State, report: &StageReport) -> String {
+    match report.status {
+        Status::Done => {
+            delta(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
+        }
+        Status::Running | Status::Reused | Status::Skipped => String::new(),
+    }
+}
+
+/// The stages that took a noticeable share of the time, and how many were reused; in short or only the longest one if there is no
+/// room. Empty if not even that fits.
+pub(super) fn in_one_line(state: &State, room: u16) -> Line {
+    let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
+    let total: f64 = done().map(|it| it.seconds).sum();
+    let longest = done().map(|it| it.seconds).fold(0.0, f64::max);
+    let first = done().find(|it| it.seconds >= longest).map(|it| it.name);
+    let counts = |it: &StageReport| it.seconds >= SMALL * total;
+    let forms = [
+        in_one_line_of(state, true, counts),
+        in_one_line_of(state, false, counts),
+        in_one_line_of(state, false, |it| Some(it.name) == first),
+    ];
+    forms.into_iter().find(|line| width(line) <= room).unwrap_or_default()
+}
+
+fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> Line {
+    let mut line = Line::new();
+    let mut reused = 0;
+    for report in state.work.stages.iter().flatten() {
+        reused += usize::from(report.status == Status::Reused);
+        if report.status == Status::Done && counts(report) {
+            let comma = if line.is_empty() { "" } else { ", " };
+            line.push((
+                format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),
+                weight(state, Some(report)),
+            ));
+            let change = change(state, report);
+            if !change.is_empty() {
+                line.push((format!(" {change}"), Tone::Strong));
+            }
+        }
+    }
+    if reused > 0 {
+        let comma = if line.is_empty() { "" } else { ", " };
+        let stages = if is_long { counted(reused, "stage") } else { reused.to_string() };
+        line.push((format!("{comma}{stages} reused"), Tone::Faint));
+    }
+    line
+}
+
+/// The stage that is at work.
+pub(super) fn at_work(state: &State) -> Option<&'static str> {
+    let mut stages = state.work.stages.iter().flatten();
+    stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
+}
+
+/// Loaded fraction of an asset.
+pub(super) fn fraction(asset: &AssetBar) -> f64 {
+    let progress = &asset.progress;
+    if progress.total == 0 { 1.0 } else { progress.done as f64 / progress.total as f64 }
+}

@@ -1,0 +1,134 @@
+//! The last pictures as a strip, the newest at its top, each with what changed since the one before.
+
+use super::preview;
+use super::strip_words::{Words, fitting};
+use super::text::{Tone, put, rest, row};
+use crate::action::Action;
+use crate::film::Picture;
+use crate::keymap;
+use crate::state::State;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+
+/// Rows of an entry: of its picture, of all of it, and up to the next one.
+#[derive(Clone, Copy)]
+struct Rows {
+    picture: u16,
+    entry: u16,
+    pitch: u16,
+}
+
+/// In a narrow strip, a row stays free below the picture, unless the words need it.
+const NARROW_ROWS: Rows = Rows { picture: 3, entry: 4, pitch: 4 };
+const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
+/// A strip of so many columns is wide.
+const WIDE: u16 = 40;
+/// Columns of the words beside a picture.
+const LEAST_WORDS: u16 = 10;
+/// Width of a column of pictures if there are several.
+const COLUMN: u16 = 44;
+
+/// A picture of the strip and its place.
+struct Item {
+    /// Index among the pictures that are kept.
+    index: usize,
+    cells: Rect,
+    rows: Rows,
+}
+
+/// Draws it at the bottom of an area.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+    let items = items(state, area);
+    let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
+    let depth = state.display.depth;
+    let keys = keymap::of(Action::OlderPicture).map_or("", |binding| binding.label);
+    let title = Rect { y: top - 1, height: 1, ..area };
+    put(
+        buffer,
+        title,
+        &[("the last pictures", Tone::Strong), ("  ", Tone::Plain), (keys, Tone::Faint)],
+        depth,
+    );
+    for item in items {
+        draw_item(state, &item, buffer);
+    }
+}
+
+fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buffer) {
+    let history = &state.picture.history;
+    let Some(picture) = history.small(*index) else { return };
+    let place = Rect { height: rows.picture, ..*cells };
+    let place = Rect { width: width(state, picture, place), ..place };
+    preview::draw_small(state, picture, place, buffer);
+    let is_looked_at = history.looked_at() == Some(*index);
+    let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
+    // The words stand beside the picture alone, and in the same columns with and without a mark.
+    let words = Words {
+        head: format!("{mark}{} ", number(state, *index)),
+        changes: history.changes(*index, is_under_way(state, *index)),
+    };
+    let beside = rest(*cells, place.width + 1);
+    let lines = fitting(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
+    for (y, line) in (0..rows.entry).zip(&lines) {
+        put(buffer, row(beside, y), &[(line, tone)], state.display.depth);
+    }
+}
+
+/// Number of the run that made a picture, or that is making it; a dash if it was stopped.
+fn number(state: &State, index: usize) -> String {
+    let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
+    state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
+}
+
+/// Whether the render of a picture goes on.
+fn is_under_way(state: &State, index: usize) -> bool {
+    state.work.is_under_way() && state.picture.history.is_of(index, state.request.generation)
+}
+
+/// Columns of a picture of this height, so that words have room beside it.
+fn width(state: &State, picture: &Picture, cells: Rect) -> u16 {
+    let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
+    let width = (f32::from(cells.height) * shape).round() as u16;
+    width.clamp(1, cells.width.saturating_sub(LEAST_WORDS + 1).max(1))
+}
+
+/// Rows of the whole strip in an area. 0 if there is nothing to choose from, or no room.
+pub(super) fn rows(state: &State, area: Rect) -> u16 {
+    let items = items(state, area);
+    let top = items.iter().map(|item| item.cells.y).min();
+    top.map_or(0, |top| area.bottom() - top + 1)
+}
+
+/// The pictures that have room, at the bottom of an area: the newest at the top, and of older ones the one that is looked at.
+fn items(state: &State, area: Rect) -> Vec<Item> {
+    let count = state.picture.history.len();
+    let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
+    let columns = (area.width / COLUMN).max(1);
+    let gap = rows.pitch - rows.entry;
+    // The title has a row.
+    let most = (area.height + gap).saturating_sub(1) / rows.pitch;
+    let room = usize::from(most) * usize::from(columns);
+    if count < 2 || room < 2 || area.width < LEAST_WORDS + 8 {
+        return Vec::new();
+    }
+    let shown = count.min(room);
+    let looked_at = state.picture.history.looked_at().unwrap_or(count - 1);
+    let first = (count - shown).min(looked_at);
+    // As few rows as hold them all.
+    let high = shown.div_ceil(usize::from(columns)) as u16;
+    let width = area.width / columns;
+    let place = |number: u16| {
+        let (column, line) = (number / high, number % high);
+        let beside = u16::from(column + 1 < columns);
+        let y = area.bottom() + gap - (high - line) * rows.pitch;
+        Rect { x: area.x + column * width, y, width: width - beside, height: rows.entry }
+    };
+    let item = |number: usize| Item { index: first + shown - 1 - number, cells: place(number as u16), rows };
+    (0..shown).map(item).collect()
+}
+
+/// The picture of the strip in this area at a cell.
+pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
+    let is_there = |item: &Item| item.cells.contains((column, row).into());
+    items(state, area).into_iter().find(is_there).map(|item| item.index)
+}

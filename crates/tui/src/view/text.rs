@@ -1,0 +1,340 @@
+//! Text for cells: styles that do without colour, amounts in words.
+
+use std::time::Duration;
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::style::{Color, Modifier, Style};
+use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
+
+use crate::color::ColorDepth;
+pub(super) use crate::pipeline::words::seconds;
+
+/// Role of a piece of text. The colours are those of the terminal's own palette of 16, which follow its theme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tone {
+    Plain,
+    /// Settled, or less important.
+    Faint,
+    /// New, or to be read first.
+    Strong,
+    Working,
+    Good,
+    Warning,
+    Error,
+    /// The name of a written file: a link, where the terminal has them.
+    File,
+    /// The line that is chosen of a list.
+    Chosen,
+}
+
+impl Tone {
+    /// Its style; without colours, modifiers alone.
+    pub(super) fn style(self, depth: ColorDepth) -> Style {
+        let (color, modifier) = match self {
+            Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
+            Self::Faint => (Color::Reset, Modifier::DIM),
+            Self::Strong => (Color::Reset, Modifier::BOLD),
+            // The plain blue of many palettes cannot be read on black.
+            Self::Working => (Color::LightBlue, Modifier::empty()),
+            Self::Good => (Color::Green, Modifier::empty()),
+            Self::Warning => (Color::Yellow, Modifier::empty()),
+            Self::Error => (Color::Red, Modifier::BOLD),
+            Self::Chosen => (Color::Reset, Modifier::BOLD.union(Modifier::REVERSED)),
+        };
+        let color = if depth == ColorDepth::None { Color::Reset } else { color };
+        Style::new().fg(color).bg(Color::Reset).add_modifier(modifier)
+    }
+
+    /// The same as a block of colour, black or white on it, whichever every theme can read; without colours reversed.
+    pub(super) fn block(self, depth: ColorDepth) -> Style {
+        let (fg, bg) = match self {
+            _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
+            Self::Working => (Color::White, Color::Blue),
+            Self::Good => (Color::Black, Color::Green),
+            Self::Warning => (Color::Black, Color::Yellow),
+            Self::Error => (Color::White, Color::Red),
+            Self::Plain | Self::Faint | Self::Strong | Self::File | Self::Chosen => {
+                (Color::Reset, Color::Reset)
+            }
+        };
+        // Bold black is grey in xterm and others, which draw bold by the brighter half of the palette.
+        let reversed = Modifier::REVERSED.union(Modifier::BOLD);
+        let modifier = if bg == Color::Reset { reversed } else { Modifier::empty() };
+        Style::new().fg(fg).bg(bg).add_modifier(modifier)
+    }
+}
+
+/// Writes pieces from the left into the first row of the area; what does not fit is cut and ends in `…`. Returns the
+/// columns used.
+pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
+    let area = area.intersection(buffer.area);
+    if area.is_empty() {
+        return 0;
+    }
+    let length: usize = pieces.iter().map(|(text, _)| text.width()).sum();
+    let is_cut = length > usize::from(area.width);
+    let end = area.right() - u16::from(is_cut);
+    let mut x = area.x;
+    for (text, tone) in pieces {
+        let style = tone.style(depth);
+        x = buffer.set_stringn(x, area.y, text, usize::from(end - x), style).0;
+        if is_cut && x + 1 >= end && columns(text) > 0 {
+            // A character of two columns may leave one of them.
+            buffer.set_stringn(x, area.y, "…", 1, style);
+        }
+    }
+    if is_cut { area.width } else { x - area.x }
+}
+
+/// Writes a text so that it ends at the right edge of the first row, if it fits.
+pub(super) fn put_right(buffer: &mut Buffer, area: Rect, text: &str, tone: Tone, depth: ColorDepth) -> u16 {
+    let width = columns(text);
+    if width > area.width {
+        return 0;
+    }
+    put(buffer, Rect { x: area.right() - width, width, ..area }, &[(text, tone)], depth)
+}
+
+/// Columns that a text takes.
+pub(crate) fn columns(text: &str) -> u16 {
+    u16::try_from(text.width()).unwrap_or(u16::MAX)
+}
+
+/// A row of the area, counted from its top; empty below its end.
+pub(super) fn row(area: Rect, index: u16) -> Rect {
+    if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
+}
+
+/// The rest of a row to the right of the columns used.
+pub(super) fn rest(area: Rect, used: u16) -> Rect {
+    let used = used.min(area.width);
+    Rect { x: area.x + used, width: area.width - used, ..area }
+}
+
+/// The text as far as it fits, with an ellipsis if it is cut.
+pub(crate) fn shortened(text: &str, room: u16) -> String {
+    if columns(text) <= room {
+        return text.to_owned();
+    }
+    let mut short = String::new();
+    let mut width = 1;
+    for character in text.chars() {
+        width += character.width().unwrap_or(0);
+        if width > usize::from(room) {
+            break;
+        }
+        short.push(character);
+    }
+    if room == 0 { short } else { format!("{}…", short.trim_end()) }
+}
+
+/// Breaks a text into lines, between words if possible.
+pub fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let width = width.max(1);
+    let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
+    for word in text.split_inclusive(' ') {
+        let of_word = word.trim_end().width();
+        if length > 0 && length + of_word > width {
+            lines.push(std::mem::take(&mut line));
+            length = 0;
+        }
+        for character in word.chars() {
+            let wide = character.width().unwrap_or(0);
+            if length + wide > width && character != ' ' {
+                lines.push(std::mem::take(&mut line));
+                length = 0;
+            }
+            line.push(character);
+            length += wide;
+        }
+    }
+    lines.push(line);
+    lines.into_iter().map(|line| line.trim_end().to_owned()).collect()
+}
+
+/// A duration in a few characters.
+pub(crate) fn duration(time: Duration) -> String {
+    seconds(time.as_secs_f64())
+}
+
+/// A time that runs and does not flicker: tenths of seconds until a minute.
+pub(super) fn running(time: Duration) -> String {
+    if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time) }
+}
+
+/// A size of a file.
+pub(super) fn bytes(bytes: u64) -> String {
+    match bytes {
+        0..1000 => format!("{bytes} B"),
+        1000..1_000_000 => format!("{:.1} kB", bytes as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
+    }
+}
+
+/// A time that is expected, with two digits at most: `about 9 s`.
+pub(super) fn about(seconds: f64) -> String {
+    match seconds {
+        x if x < 1.0 => "under 1 s".to_owned(),
+        x if x < 99.5 => format!("about {x:.0} s"),
+        x if x < 99.5 * 60.0 => format!("about {:.0} min", x / 60.0),
+        x if x <= 24.0 * 3600.0 => format!("about {:.0} h", x / 3600.0),
+        _ => "over a day".to_owned(),
+    }
+}
+
+/// Change of a stage's time, in the unit of the time unless the change is far greater; empty if it means nothing.
+pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
+    /// Times of the same work differ by so much.
+    const NOISE: f64 = 0.05;
+    let Some(before) = before else { return String::new() };
+    let change = seconds - before;
+    let (in_units, unit) = if seconds < 0.999_5 { (change * 1e3, "ms") } else { (change, "s") };
+    let amount = match in_units.abs() {
+        x if x >= 9.95 => format!("{x:.0}"),
+        x => format!("{x:.1}"),
+    };
+    let amount = amount.strip_prefix('0').unwrap_or(&amount);
+    if change.abs() <= NOISE * before || amount == ".0" || !change.is_finite() {
+        return String::new();
+    }
+    let sign = if change < 0.0 { "−" } else { "+" };
+    let is_far_more = seconds < 0.999_5 && change.abs() >= 0.999_5;
+    if is_far_more {
+        format!("{sign}{}", self::seconds(change.abs()))
+    } else {
+        format!("{sign}{amount} {unit}")
+    }
+}
+
+/// A thin bar: its filled part and the rest, together of this many columns.
+pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
+    let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
+    let columns = usize::from(columns);
+    let filled = ((fraction.clamp(0.0, 1.0) * columns as f64).floor() as usize).min(columns);
+    (full.repeat(filled), empty.repeat(columns - filled))
+}
+
+/// Whole percent; 100 only when everything is done.
+pub(crate) fn percent(fraction: f64) -> u32 {
+    (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
+}
+
+/// A small part in percent, with two digits: `2.1 %`, `1 %`.
+pub(super) fn share(part: f64) -> String {
+    let percent = part * 100.0;
+    let digits = if percent > 0.0 { (1 - percent.log10().floor() as i32).clamp(0, 6) } else { 0 };
+    let text = format!("{percent:.0$}", digits as usize);
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    format!("{text} %")
+}
+
+/// Three digits or more.
+pub(super) fn number(x: f32) -> String {
+    let digits = match x.abs() {
+        x if x >= 100.0 => 0,
+        x if x >= 10.0 => 1,
+        x if x >= 1.0 => 2,
+        x if x >= 1e-3 || x == 0.0 => 4,
+        _ => return format!("{x:.1e}"),
+    };
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// `1 error`, `2 errors`.
+pub(super) fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// xterm draws bold black as grey.
+    #[test]
+    fn nothing_on_a_block_of_colour_is_bold() {
+        for tone in [Tone::Working, Tone::Good, Tone::Warning, Tone::Error] {
+            let style = tone.block(ColorDepth::TrueColor);
+            assert!(!style.add_modifier.contains(Modifier::BOLD), "{tone:?}");
+            assert!(tone.block(ColorDepth::None).add_modifier.contains(Modifier::REVERSED), "{tone:?}");
+        }
+    }
+
+    #[test]
+    fn shares_have_two_digits() {
+        let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(share);
+        assert_eq!(shares, ["2.1 %", "1 %", "0.043 %", "50 %", "170 %", "0 %", "10 %"]);
+    }
+
+    #[test]
+    fn a_bar_is_full_only_at_the_end() {
+        let bar = |fraction, ascii| {
+            let (filled, rest) = gauge(fraction, 4, ascii);
+            filled + &rest
+        };
+        assert_eq!(bar(0.999, false), "━━━─");
+        assert_eq!(bar(1.0, false), "━━━━");
+        assert_eq!(bar(f64::NAN, true), "----");
+        assert_eq!((percent(0.999), percent(1.0)), (99, 100));
+    }
+
+    #[test]
+    fn the_change_of_a_time_is_told_in_its_unit() {
+        for (seconds, before, words) in [
+            (1.12, Some(1.42), "−.3 s"),
+            (1.12, Some(1.10), ""),
+            (0.023, Some(0.019), "+4.0 ms"),
+            (0.5, Some(1.5), "−1.00 s"),
+            (0.985, Some(4.635), "−3.65 s"),
+            (0.02, Some(200.0), "−3 min 20 s"),
+            (0.9, Some(0.1), "+800 ms"),
+            (12.0, Some(1.0), "+11 s"),
+            (2.0, Some(1.96), ""),
+            (0.000_02, Some(0.000_01), ""),
+            (1.0, None, ""),
+        ] {
+            assert_eq!(delta(seconds, before), words, "{seconds} {before:?}");
+        }
+    }
+
+    #[test]
+    fn an_expected_time_has_two_digits() {
+        let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(about);
+        let words = [
+            "under 1 s",
+            "about 1 s",
+            "about 9 s",
+            "about 14 s",
+            "about 99 s",
+            "about 2 min",
+            "about 13 min",
+            "about 2 h",
+            "over a day",
+        ];
+        assert_eq!(times, words);
+    }
+
+    #[test]
+    fn every_text_that_is_cut_says_so() {
+        for (text, room, shown) in [
+            ("abcdef", 6, "abcdef"),
+            ("abcdef", 5, "abcd…"),
+            ("日本語", 5, "日本…"),
+            ("日本語", 4, "日…"),
+            ("ab", 1, "…"),
+        ] {
+            assert_eq!(shortened(text, room), shown);
+            for split in text.char_indices().map(|(at, _)| at) {
+                let area = Rect::new(0, 0, room, 1);
+                let mut buffer = Buffer::empty(area);
+                let (first, second) = text.split_at(split);
+                put(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
+                let seen: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
+                // The right half of a wide character is a blank of the buffer.
+                assert_eq!(seen.replace(' ', ""), shown, "{text} {room} {split}");
+            }
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The list of views, for a moment after one was chosen: in the panel if that has room, else over the picture.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use ratatui::widgets::{Clear, Widget};
+
+use super::layout::Layout;
+use super::text::{Tone, put};
+use crate::choice::Choice;
+use crate::pipeline::settings::View;
+use crate::state::State;
+
+/// Columns of one view with its digit.
+const WIDTH: u16 = 16;
+/// Views that have a digit, always the same one.
+pub(crate) const DIGITS: usize = 9;
+
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+    let current = View::ALL.iter().position(|view| *view == state.request.view()).unwrap_or(0);
+    let area = area(layout).intersection(buffer.area);
+    if area.is_empty() {
+        return;
+    }
+    // Nothing that the list cuts off stays in sight beside or below it.
+    let is_in_panel = layout.panel.intersection(area) == area;
+    Clear.render(if is_in_panel { layout.panel } else { area }, buffer);
+    let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
+    // Where they do not all fit, the current one is in the middle.
+    let shown = columns * rows;
+    let first = current.saturating_sub(shown / 2).min(View::ALL.len().saturating_sub(shown));
+    for (index, number) in (first..View::ALL.len()).take(shown).enumerate() {
+        let (column, row) = ((index / rows) as u16, (index % rows) as u16);
+        let place =
+            Rect { x: area.x + column * WIDTH, y: area.y + row, width: WIDTH.min(area.width), height: 1 };
+        let is_cut = index == 0 && first > 0 || index + 1 == shown && number + 1 < View::ALL.len();
+        let more = if !is_cut {
+            ""
+        } else if index == 0 {
+            "▴"
+        } else {
+            "▾"
+        };
+        line(state, number, (current, more), place, buffer);
+    }
+}
+
+/// Views of one column below each other.
+pub(crate) fn rows(state: &State) -> usize {
+    usize::from(area(&Layout::of(state)).height).max(1)
+}
+
+/// A view with its digit, and a mark if there are more above or below.
+fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rect, buffer: &mut Buffer) {
+    let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
+    let is_current = number == current;
+    let sign = if is_current { "▸" } else { " " };
+    let name = format!(" {:<11}", View::ALL[number].name());
+    let tone = if is_current { Tone::Chosen } else { Tone::Plain };
+    let more = format!(" {more}");
+    let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone), (&*more, Tone::Strong)];
+    put(buffer, place, &pieces, state.display.depth);
+}
+
+/// One column in a panel that is high enough, else two or what there is room for.
+fn area(layout: &Layout) -> Rect {
+    let all = View::ALL.len() as u16;
+    let panel = layout.panel;
+    if panel.width >= WIDTH && panel.height >= all {
+        return Rect { height: all, ..panel };
+    }
+    let around = if panel.width >= 2 * WIDTH && panel.height >= all / 2 { panel } else { layout.preview };
+    let columns = if around.height >= all { 1 } else { 2 };
+    let width = (columns * WIDTH).min(around.width);
+    Rect { x: around.right() - width, width, height: all.div_ceil(columns).min(around.height), ..around }
+}

@@ -1,0 +1,119 @@
+//! Import cycles between the files of a module. Without cycles, a module can be read in one order.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+
+use super::imports::{Module, Modules};
+use super::{all_sources, root};
+
+/// Pairs of files that import from each other, and why.
+const PAIRS: [(&str, &str, &str); 9] = [
+    (
+        "accel/bvh/build",
+        "accel/bvh/top_node",
+        "the upper levels are built from the references that the builder sorts",
+    ),
+    (
+        "accel/wide_bvh/build/split",
+        "accel/wide_bvh/simd/binning",
+        "the bins of a split are counted with vector instructions",
+    ),
+    (
+        "cli/bench/measure",
+        "cli/bench/run",
+        "a run measures methods, each of which reads the options of the run",
+    ),
+    ("output/error", "output/format", "an error lists the formats; an unknown format is an error"),
+    (
+        "scene/description/material",
+        "scene/fingerprint",
+        "a fingerprint looks up the textures that materials name",
+    ),
+    ("scene/document/key", "scene/document/table", "a key may contain a table, and a table contains keys"),
+    (
+        "pipeline/watch/content",
+        "pipeline/watch/outputs",
+        "outputs share the stored contents, which show whether an output was replaced",
+    ),
+    ("world/geometry", "world/isolated", "the geometry stores the isolated surfaces found in it"),
+    ("world/mesh_instance", "world/mesh_packet", "packets and single hits are interpolated identically"),
+];
+
+/// All files with their imports.
+fn all_modules() -> Modules {
+    Modules::new(all_sources().into_iter().map(|(file, path)| {
+        let path = path.to_str().expect("UTF-8").to_owned();
+        (path, fs::read_to_string(&file).expect("a source file"))
+    }))
+}
+
+/// Groups of files of one module that reach each other through imports.
+fn cycles() -> Vec<Vec<String>> {
+    let modules = all_modules();
+    let used: BTreeMap<&Module, BTreeSet<Module>> = modules
+        .all()
+        .map(|module| {
+            let in_module = |other: &Module| other[0] == module[0];
+            (module, modules.used_by(module).into_iter().filter(in_module).collect())
+        })
+        .collect();
+    let reached: BTreeMap<&Module, BTreeSet<&Module>> =
+        used.keys().map(|module| (*module, reached_from(module, &used))).collect();
+    let reaches = |from: &Module, to: &Module| reached[from].contains(to);
+    let mut cycles = BTreeSet::new();
+    for module in modules.all().filter(|module| reaches(module, module)) {
+        let cycle = modules.all().filter(|other| reaches(module, other) && reaches(other, module));
+        cycles.insert(cycle.map(|module| module.join("/")).collect());
+    }
+    cycles.into_iter().collect()
+}
+
+fn reached_from<'a>(start: &Module, used: &'a BTreeMap<&Module, BTreeSet<Module>>) -> BTreeSet<&'a Module> {
+    let mut reached = BTreeSet::new();
+    let mut next: Vec<&Module> = used[start].iter().collect();
+    while let Some(module) = next.pop() {
+        if reached.insert(module) {
+            next.extend(&used[module]);
+        }
+    }
+    reached
+}
+
+#[test]
+fn only_listed_pairs_of_files_import_each_other() {
+    let mut pairs = BTreeSet::new();
+    for cycle in cycles() {
+        match &cycle[..] {
+            [one, other] => drop(pairs.insert((one.clone(), other.clone()))),
+            larger => panic!("{} files import each other in a cycle: {larger:?}", larger.len()),
+        }
+    }
+    let listed = PAIRS.map(|(one, other, _)| (one.to_owned(), other.to_owned()));
+    assert_eq!(pairs, BTreeSet::from(listed), "pairs that exist, and pairs that are listed");
+}
+
+/// The rank of each submodule of the integrators, from the `text` block of their documentation: one line per rank.
+fn ranks() -> BTreeMap<String, usize> {
+    let map = fs::read_to_string(root().join("crates/trace/src/integrators/mod.rs")).expect("the map");
+    let block = map.split("```").nth(1).and_then(|block| block.strip_prefix("text\n")).expect("a table");
+    let lines = block.lines().filter_map(|line| line.strip_prefix("//! ")?.split_once("  ")).enumerate();
+    let parts = |(rank, (names, _)): (usize, (&str, &str))| {
+        names.split(", ").map(|name| (name.to_owned(), rank)).collect::<Vec<_>>()
+    };
+    lines.flat_map(parts).collect()
+}
+
+#[test]
+fn integrators_use_only_modules_above_them() {
+    let (modules, ranks) = (all_modules(), ranks());
+    let mut found = BTreeSet::new();
+    for module in modules.all().filter(|module| module[0] == "integrators" && module.len() > 1) {
+        let rank = ranks.get(&module[1]).unwrap_or_else(|| panic!("{module:?} is not in the table"));
+        found.insert(module[1].clone());
+        for used in modules.used_by(module) {
+            let is_other = used[0] == "integrators" && used.len() > 1 && used[1] != module[1];
+            assert!(!is_other || ranks[&used[1]] < *rank, "{module:?} uses {used:?}");
+        }
+    }
+    assert_eq!(found, ranks.into_keys().collect(), "submodules that exist, and submodules in the table");
+}
