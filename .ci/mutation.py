@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutation testing with hand-written faults: each fault of the table below must make its test fail.
 
-    python3 .ci/injected_errors.py [PROFILE [WORD]]      (default: dev)
+    python3 .ci/mutation.py [PROFILE [WORD]]      (default: dev)
 
 All faults are inserted at once into a copy of the sources under target/injected, each behind a switch, so that the copy is built only
 once. All tests must pass without a fault; then each test is run with only its own fault switched on. The sources themselves are not
@@ -307,17 +307,20 @@ FAULTS = [
 ]
 
 
-def crate_of(room):
-    """The folder of the crate that contains a module folder."""
-    found = [crate for crate in (COPY / "crates").iterdir() if (crate / "src" / room).is_dir()]
+def crate_of(module):
+    """The folder of the crate that contains a top-level module, or is one."""
+    crates = list((COPY / "crates").iterdir())
+    found = [crate for crate in crates if crate.name == module or (crate / "src" / module).is_dir()]
     if len(found) != 1:
-        sys.exit(f"no crate, or more than one, contains {room}")
+        sys.exit(f"no crate, or more than one, contains {module}")
     return found[0]
 
 
 def source(file):
-    """The path of a file, given relative to the src folder of its crate."""
-    return crate_of(file.split("/")[0]) / "src" / file
+    """The path of a file, given as a module path such as `materials/texture.rs`."""
+    module, rest = file.split("/", 1)
+    crate = crate_of(module)
+    return crate / "src" / (rest if crate.name == module else file)
 
 
 def copy_with_faults(faults_asked):
@@ -357,8 +360,10 @@ def executables(profile):
 
 
 def passes(programs, test, fault=None):
-    room = test.split("::")[0]
-    program = programs["suite" if room == "closed_forms" else "glimt_" + crate_of(room).name]
+    module = test.split("::")[0]
+    crate = None if module == "closed_forms" else crate_of(module).name
+    program = programs[f"glimt_{crate}" if crate else "suite"]
+    test = test.removeprefix(f"{crate}::") if crate == module else test
     env = {**os.environ, "GLIMT_FAULT": "" if fault is None else str(fault)}
     run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
     if "1 passed" not in run.stdout and "1 failed" not in run.stdout:
