@@ -1,4 +1,4 @@
-//! glimt: parse, run, exit code.
+//! The `glimt` executable.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! A scene to a picture, by the library: `cargo run --release --example picture`.
+//! Renders a scene with the library: `cargo run --release --example picture`.
 
 use std::error::Error;
 
@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     picture("scenes/cornell.toml", "cornell.png")
 }
 
-/// Renders a scene with few samples and writes it as PNG.
+/// Renders a scene with 4 samples per pixel and writes it as a PNG file.
 pub(crate) fn picture(scene: &str, png: &str) -> Result<(), Box<dyn Error>> {
     let token = CancelToken::new();
     let options = Overrides { samples: Some(4), ..Overrides::default() };
