@@ -1,5 +1,5 @@
 //! Shared foundations of glimt: numbers, color, random samples, films, named choices and the operating
-//! system. The crate `glimt` has the map of the workspace.
+//! system. See the crate `glimt` for an overview.
 
 pub mod choice;
 pub mod control;

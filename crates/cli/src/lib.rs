@@ -16,7 +16,7 @@ mod once;
 mod progress;
 mod signals;
 
-// Modules of the crates below, under the names used throughout the workspace.
+// Modules of lower crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, system};
 use glimt_files::{compare, output};
 use glimt_kernel::accel;

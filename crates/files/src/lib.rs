@@ -1,9 +1,9 @@
-//! glimt: bytes to meshes and textures, pictures to bytes, the error between pictures. The map of the house is in the crate `glimt`.
+//! Reads meshes and images, writes images, and compares them. See the crate `glimt` for an overview.
 
 pub mod assets;
 pub mod compare;
 pub mod output;
 
-// The rooms below, under the names that they have in the whole house.
+// Modules of lower crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, system};
 use glimt_kernel::{geometry, materials};

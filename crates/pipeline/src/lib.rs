@@ -38,7 +38,7 @@ mod worker;
 #[cfg(test)]
 mod tests;
 
-// Modules of the crates below, under the names used throughout the workspace.
+// Modules of lower crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, system};
 use glimt_files::{assets, output};
 use glimt_kernel::{lights, materials};

@@ -21,7 +21,7 @@ pub mod sanitize;
 mod source;
 mod toml;
 
-// Modules of the crates below, under the names used throughout the workspace.
+// Modules of lower crates, under the names used throughout the workspace.
 use glimt_base::{choice, film, math, sampling, system};
 use glimt_kernel::{geometry, lights, materials};
 

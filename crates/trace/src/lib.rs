@@ -1,19 +1,19 @@
-//! glimt: the world that is traced, and the integrators. The map of the house is in the crate `glimt`.
+//! The world that rays are traced against, and the integrators. See the crate `glimt` for an overview.
 //!
-//! | folder | what it knows |
+//! | module | contents |
 //! | --- | --- |
-//! | [`world`] | everything ready to trace: objects and their trees, materials, lights, the camera, glass solids |
-//! | `integrators/` | [`RenderSettings`](integrators::RenderSettings), [`View`](integrators::View), and [`render_tile_with_photons`](integrators::render_tile_with_photons), which renders a tile |
-//! | `integrators/transport/` | rays of a tile, packets of their hits, vertices in rows of sixteen, the walk through glass, scattering |
+//! | [`world`] | objects and their acceleration structures, materials, lights, the camera, glass solids |
+//! | [`integrators`] | [`RenderSettings`](integrators::RenderSettings), [`View`](integrators::View), and [`render_tile_with_photons`](integrators::render_tile_with_photons), which renders a tile |
+//! | `integrators/transport/` | rays of a tile, packets of their hits, packets of sixteen vertices, paths through glass, scattering |
 //! | `integrators/direct/` | light samples, shadow rays, lobe rays, MIS weights |
 //! | `integrators/photons/` | photon emission, maps, gathering |
 //!
-//! `world` knows neither pixels nor settings of a render. The table in `integrators` says which of its parts uses which.
+//! `world` depends on neither pixels nor render settings. The table in [`integrators`] lists the dependencies between its submodules.
 
 pub mod integrators;
 pub mod world;
 
-// The rooms below, under the names that they have in the whole house.
+// Modules of lower crates, under the names used throughout the workspace.
 use glimt_base::{choice, control, film, math, sampling};
 use glimt_files::assets;
 use glimt_kernel::{accel, geometry, lights, materials};

@@ -46,7 +46,7 @@ mod fixtures;
 #[cfg(test)]
 mod tests;
 
-// Modules of the crates below, under the names used throughout the workspace.
+// Modules of lower crates, under the names used throughout the workspace.
 use glimt_base::{choice, film, math, system};
 use glimt_pipeline as pipeline;
 use glimt_scene as scene;
