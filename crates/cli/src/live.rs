@@ -16,7 +16,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
 use crate::system::threads::start_failure;
-use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
+use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
 /// Time that the end waits for a picture that is being written, after a signal; and after a key, until a person hears what it
 /// waits for.
@@ -78,7 +78,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         previews: worker.previews.clone(),
         news,
     });
-    let waits = |ended: &Ended| {
+    let waits = |ended: &TuiOutcome| {
         ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_last_stage())
     };
     let has_ended = if worker.end_within(PATIENCE) || !outcome.as_ref().is_ok_and(waits) {
@@ -95,7 +95,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         let lost = contents.outputs.lost(&contents);
         last_words(&writes, ended, (has_ended, &lost, &call())).iter().for_each(|line| console.say(line));
     }
-    let exit = |ended: Ended| match ended.status {
+    let exit = |ended: TuiOutcome| match ended.status {
         ExitStatus::QUIT if ended.is_unwritten => Exit::FAILED,
         status => Exit(status.0),
     };
@@ -110,7 +110,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
 /// other programs have changed. `call`: this call, in words for a shell.
 fn last_words(
     writes: &Writes,
-    ended: &Ended,
+    ended: &TuiOutcome,
     (has_ended, lost, call): (bool, &[(PathBuf, Lost)], &str),
 ) -> Vec<String> {
     let mut lines = writes.said(ended.is_write_unanswered, has_ended);
@@ -310,7 +310,7 @@ mod tests {
     #[test]
     fn an_order_that_was_not_carried_out_is_told_beside_the_files_that_are_there() {
         let summary = "wrote a.png: 640×480, 4 samples, 1.39 s; the render after it was stopped at 0 %";
-        let ended = |has_written| Ended {
+        let ended = |has_written| TuiOutcome {
             status: ExitStatus::QUIT,
             is_write_unanswered: true,
             summary: summary.to_owned(),
@@ -325,7 +325,7 @@ mod tests {
         let message = "the newest picture is not written".to_owned();
         writes.hear(&Event::WriteFailed { generation: 2, path: None, message });
         let error = "error: the newest picture is not written";
-        let said = |ended: Ended| last_words(&writes, &ended, (true, &[], "glimt a.toml"));
+        let said = |ended: TuiOutcome| last_words(&writes, &ended, (true, &[], "glimt a.toml"));
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
         writes.hear(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
@@ -334,7 +334,7 @@ mod tests {
 
     #[test]
     fn the_last_line_lists_changes_and_the_summary_says_what_became_of_the_files() {
-        let ended = |status| Ended {
+        let ended = |status| TuiOutcome {
             status,
             is_write_unanswered: false,
             summary: "a.png not finished (10 %)".to_owned(),

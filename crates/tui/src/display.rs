@@ -5,16 +5,16 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::chrome::Chrome;
 use super::color::ColorDepth;
+use super::connection::{Connection, QueryKind};
 use super::event::FrameReport;
-use super::graphics::{Images, Placement};
-use super::known::Answer;
-use super::known::Ask;
-use super::line::{Line, Question};
-use super::paint::{Besides, Fidelity, Painter};
+use super::graphics::{Images, PixelPlacement};
+use super::paint::{Fidelity, FrameExtras, Painter};
 use super::preview_kind::PreviewKind;
 use super::terminal;
+use super::terminal_replies::TerminalQueries;
+use super::terminal_replies::TerminalReply;
+use super::window_title::WindowTitle;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
 pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
@@ -29,7 +29,7 @@ const LARGE: usize = 2_000;
 
 /// The way to the terminal, as far as it is known before anything was sent.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Way {
+pub(super) struct TerminalLink {
     /// Inside tmux or screen, which answer themselves and draw when they like.
     pub(super) is_multiplexed: bool,
     /// Inside tmux.
@@ -39,34 +39,34 @@ pub(super) struct Way {
     /// Whether the terminal knows REP.
     pub(super) can_repeat: bool,
     /// Questions to the terminal.
-    pub(super) ask: Ask,
+    pub(super) ask: TerminalQueries,
 }
 
-impl Way {
+impl TerminalLink {
     /// Nothing is known of the line yet. What answers inside a multiplexer says nothing of a network behind it.
-    fn line(self, now: Instant) -> Line {
-        Line::new(self.is_multiplexed && self.is_remote, now)
+    fn line(self, now: Instant) -> Connection {
+        Connection::new(self.is_multiplexed && self.is_remote, now)
     }
 }
 
 /// A writer to the terminal that does not wait until the bytes are written.
-pub(super) type Out = Box<dyn FnMut(Vec<u8>)>;
+pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
 
 /// The screen as the loop sees it.
 pub(super) struct Display {
     painter: Painter,
     /// The picture, if it is drawn in pixels.
     images: Option<Images>,
-    line: Line,
-    way: Way,
+    line: Connection,
+    way: TerminalLink,
     /// Takes bytes for the terminal.
-    out: Out,
+    out: TerminalWriter,
     /// Whether the terminal knows mode 2026.
     is_synchronized: bool,
     /// Whether all that is wanted has been sent.
     is_complete: bool,
     /// The frame of the window as it is wanted, and as it was sent.
-    chrome: [Chrome; 2],
+    chrome: [WindowTitle; 2],
     /// Notifications and texts for the clipboard, not sent yet.
     asides: Vec<u8>,
     /// Bytes that were sent since the render of the newest picture began.
@@ -81,7 +81,13 @@ pub(super) struct Display {
 
 impl Display {
     /// A screen of which nothing is known.
-    pub(super) fn new(depth: ColorDepth, way: Way, images: Option<Images>, out: Out, now: Instant) -> Self {
+    pub(super) fn new(
+        depth: ColorDepth,
+        way: TerminalLink,
+        images: Option<Images>,
+        out: TerminalWriter,
+        now: Instant,
+    ) -> Self {
         let mut display = Self {
             painter: Painter::new(depth).repeating(way.can_repeat),
             images,
@@ -104,10 +110,10 @@ impl Display {
     /// Somebody else used the terminal: its content is unknown, and so is the line.
     pub(super) fn restart(&mut self, now: Instant) {
         self.forget();
-        self.chrome[1] = Chrome::default();
+        self.chrome[1] = WindowTitle::default();
         self.line = self.way.line(now);
         let questions = [SYNCHRONIZED, &self.way.ask.questions(), ATTRIBUTES].concat();
-        self.send(questions, Some(Question::Attributes), now);
+        self.send(questions, Some(QueryKind::Attributes), now);
     }
 
     /// The content of the screen is unknown; the line is the same.
@@ -133,7 +139,7 @@ impl Display {
     }
 
     /// Places the picture in pixels. `None` if cells take its place.
-    pub(super) fn place(&mut self, wanted: Option<Placement>, is_still: bool) {
+    pub(super) fn place(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.aim(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
@@ -145,7 +151,7 @@ impl Display {
         wanted: &Buffer,
         picture: Rect,
         fidelity: Fidelity,
-        (is_new, besides): (bool, &Besides),
+        (is_new, besides): (bool, &FrameExtras),
     ) {
         if !besides.links.is_empty() {
             terminal::will_have_links();
@@ -161,7 +167,7 @@ impl Display {
     }
 
     /// Gives the window this frame, behind the picture.
-    pub(super) fn dress(&mut self, chrome: Chrome) {
+    pub(super) fn dress(&mut self, chrome: WindowTitle) {
         self.chrome[0] = chrome;
     }
 
@@ -246,24 +252,24 @@ impl Display {
         self.send(slice, question, now);
     }
 
-    fn send(&mut self, bytes: Vec<u8>, question: Option<Question>, now: Instant) {
+    fn send(&mut self, bytes: Vec<u8>, question: Option<QueryKind>, now: Instant) {
         self.line.send(bytes.len(), question, now);
         (self.out)(bytes);
     }
 
     /// The terminal answered.
-    pub(super) fn answered(&mut self, answer: Answer, now: Instant) {
+    pub(super) fn answered(&mut self, answer: TerminalReply, now: Instant) {
         match answer {
-            Answer::Ready => self.line.answered(Question::Status, now),
-            Answer::Attributes => self.line.answered(Question::Attributes, now),
-            Answer::Synchronized { is_known } => self.is_synchronized = is_known,
-            Answer::Name(_)
-            | Answer::Focus { .. }
-            | Answer::TrueColor
-            | Answer::Background(_)
-            | Answer::Ink { .. }
-            | Answer::Images(_)
-            | Answer::Other => {}
+            TerminalReply::Ready => self.line.answered(QueryKind::Status, now),
+            TerminalReply::Attributes => self.line.answered(QueryKind::Attributes, now),
+            TerminalReply::Synchronized { is_known } => self.is_synchronized = is_known,
+            TerminalReply::Name(_)
+            | TerminalReply::Focus { .. }
+            | TerminalReply::TrueColor
+            | TerminalReply::Background(_)
+            | TerminalReply::Ink { .. }
+            | TerminalReply::Images(_)
+            | TerminalReply::Other => {}
         }
     }
 
@@ -335,8 +341,8 @@ mod tests {
         let now = Instant::now();
         let all = Rc::new(Cell::new(0));
         let count = all.clone();
-        let out: Out = Box::new(move |bytes: Vec<u8>| count.set(count.get() + bytes.len()));
-        let mut display = Display::new(ColorDepth::TrueColor, Way::default(), None, out, now);
+        let out: TerminalWriter = Box::new(move |bytes: Vec<u8>| count.set(count.get() + bytes.len()));
+        let mut display = Display::new(ColorDepth::TrueColor, TerminalLink::default(), None, out, now);
         let area = Rect::new(0, 0, 40, 20);
         let mut buffer = Buffer::empty(area);
         for (number, cell) in (0_u32..).zip(&mut buffer.content) {
@@ -345,13 +351,13 @@ mod tests {
         }
         let show = |display: &mut Display, buffer: &Buffer| {
             let before = all.get();
-            display.aim(buffer, area, Fidelity::Still, (true, &Besides::default()));
+            display.aim(buffer, area, Fidelity::Still, (true, &FrameExtras::default()));
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.pump(now, || false);
                 display.written(all.get() - sent);
-                display.answered(Answer::Attributes, now);
-                display.answered(Answer::Ready, now);
+                display.answered(TerminalReply::Attributes, now);
+                display.answered(TerminalReply::Ready, now);
             }
             assert!(display.is_complete());
             (display.take_report().expect("a report").bytes, all.get() - before)

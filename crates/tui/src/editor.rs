@@ -10,7 +10,7 @@ use nix::sys::signal::Signal;
 use nix::sys::wait::{WaitPidFlag, WaitStatus, waitpid};
 use nix::unistd::Pid;
 
-use super::event::FilePlace;
+use super::event::FilePosition;
 use super::signals;
 
 /// The editor, if the environment names none.
@@ -35,7 +35,7 @@ pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'st
 ///
 /// # Errors
 /// It could not be started, or says that it failed.
-pub(super) fn run(editor: &str, place: &FilePlace) -> Result<(), String> {
+pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
     let mut shell = Command::new("/bin/sh");
     shell.arg("-c").arg(line(editor)).arg(editor).args(arguments(editor, place));
@@ -78,8 +78,8 @@ fn line(editor: &str) -> String {
 }
 
 /// Arguments that lead an editor to a place.
-fn arguments(editor: &str, place: &FilePlace) -> Vec<OsString> {
-    let FilePlace { path, line, column } = place;
+fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
+    let FilePosition { path, line, column } = place;
     // A name that begins with a dash is no option.
     let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         Path::new(".").join(path)
@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn each_editor_is_led_to_the_line_in_its_way() {
-        let place = FilePlace { path: "a b.toml".into(), line: 7, column: 3 };
+        let place = FilePosition { path: "a b.toml".into(), line: 7, column: 3 };
         for (editor, expected) in [
             ("vi", "+7 a b.toml"),
             ("/usr/bin/nvim -u NONE", "+7 a b.toml"),
@@ -153,7 +153,7 @@ mod tests {
         ] {
             assert_eq!(arguments(editor, &place).join(OsStr::new(" ")), expected, "{editor}");
         }
-        let dash = FilePlace { path: "-a.toml".into(), line: 1, column: 1 };
+        let dash = FilePosition { path: "-a.toml".into(), line: 1, column: 1 };
         assert_eq!(arguments("vi", &dash)[1], "./-a.toml");
     }
 }

@@ -1,19 +1,19 @@
 //! Knowledge about the terminal, and about the way to it, from the environment.
 
 use super::color::{ColorChoice, ColorDepth};
-use super::display::Way;
+use super::display::TerminalLink;
 use super::graphics::Protocol;
-use super::known::Ask;
 use super::options::PreviewChoice;
 use super::paint::can_repeat;
-use super::pixels::PixelRequest;
+use super::pixel_request::PixelRequest;
 use super::preview_kind::PreviewKind;
+use super::terminal_replies::TerminalQueries;
 
 /// The way to the terminal, from the environment.
-pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
+pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> TerminalLink {
     let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
-    Way {
+    TerminalLink {
         is_multiplexed: is_set("TMUX")
             || is_set("STY")
             || term.starts_with("tmux")
@@ -21,7 +21,7 @@ pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
         is_in_tmux: is_set("TMUX"),
         is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
         can_repeat: can_repeat(variable),
-        ask: Ask::default(),
+        ask: TerminalQueries::default(),
     }
 }
 
@@ -54,14 +54,14 @@ pub(super) fn ask(
     color: ColorChoice,
     depth: ColorDepth,
     variable: impl Fn(&str) -> Option<String>,
-) -> Ask {
+) -> TerminalQueries {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     let is_outermost = !way(&variable).is_multiplexed;
     let is_plain = is_plain(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
     let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
-    Ask {
+    TerminalQueries {
         blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
         name: is_outermost && !is_plain && !term.is_empty(),
         true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
@@ -97,17 +97,17 @@ mod tests {
             })
         };
         let (auto, xterm) = (PreviewChoice::Auto, ("TERM", "xterm-256color"));
-        let none = Ask::default();
+        let none = TerminalQueries::default();
         let found = ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm]);
-        assert_eq!(found, Ask { blocks: true, name: true, true_color: true, ..none });
+        assert_eq!(found, TerminalQueries { blocks: true, name: true, true_color: true, ..none });
         let found = ask(auto, ColorChoice::Ansi16, ColorDepth::Ansi16, &[xterm]);
-        assert_eq!(found, Ask { blocks: true, name: true, palette: true, ..none });
+        assert_eq!(found, TerminalQueries { blocks: true, name: true, palette: true, ..none });
         let tmux = ("TMUX", "/tmp/tmux-0/default,1,0");
         assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm, tmux]), none);
         let found = ask(PreviewChoice::HalfBlock, ColorChoice::Auto, ColorDepth::TrueColor, &[xterm]);
-        assert_eq!(found, Ask { name: true, ..none });
+        assert_eq!(found, TerminalQueries { name: true, ..none });
         let found = ask(auto, ColorChoice::None, ColorDepth::None, &[xterm]);
-        assert_eq!(found, Ask { name: true, background: true, ..none });
+        assert_eq!(found, TerminalQueries { name: true, background: true, ..none });
         assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Ansi16, &[("TERM", "linux")]), none);
     }
 }

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::known::Answer;
 use super::options::{Changed, News, OutputChange};
+use super::terminal_replies::TerminalReply;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, PreviewSource, Section};
 
@@ -22,7 +22,7 @@ pub(super) enum Event {
     /// Text was pasted.
     Paste,
     /// The terminal answered a question.
-    Answer(Answer),
+    TerminalReply(TerminalReply),
     /// The system took so many bytes for the terminal.
     Written { bytes: usize },
     /// The terminal cannot be written to.
@@ -62,7 +62,7 @@ pub(super) enum Event {
     /// The editor could not be used: why.
     NoEditor(String),
     /// A source of events ended.
-    Lost(Source),
+    Lost(EventSource),
 }
 
 impl Event {
@@ -153,7 +153,7 @@ pub(super) enum Signal {
 
 /// Sources of events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Source {
+pub(super) enum EventSource {
     Worker,
     Watcher,
     Keys,
@@ -177,7 +177,7 @@ pub(super) enum Effect {
     /// Whether the terminal is to report the mouse.
     Mouse(bool),
     /// Leave the terminal to the editor, at this place.
-    Edit(FilePlace),
+    Edit(FilePosition),
     /// Ask how large the window is.
     Measure,
     /// Send this behind the picture: a notification, a text for the clipboard.
@@ -188,7 +188,7 @@ pub(super) enum Effect {
 
 /// A place in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct FilePlace {
+pub(super) struct FilePosition {
     pub path: PathBuf,
     /// From 1.
     pub line: usize,
@@ -207,7 +207,7 @@ pub(super) struct FrameReport {
 
 /// Why a picture is not on disk although it is to be.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Unwritten {
+pub(super) struct WriteFailure {
     pub why: String,
     /// Number of the request.
     pub generation: u64,

@@ -1,7 +1,7 @@
 //! The line that stays when the screen is given back.
 
-use super::event::Unwritten;
-use super::state::{Activity, OwnImage, State, Toggles, Written};
+use super::event::WriteFailure;
+use super::state::{Activity, OwnImage, State, Toggles, WrittenFile};
 use crate::choice::Choice;
 use crate::pipeline::protocol::{OwnState, Report};
 use crate::pipeline::settings::{CameraChange, View};
@@ -92,7 +92,7 @@ fn scene_name(state: &State) -> String {
 }
 
 /// The files written and their descriptions, grouped by image.
-fn files(written: &[Written]) -> String {
+fn files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
@@ -110,7 +110,7 @@ fn files(written: &[Written]) -> String {
 }
 
 /// The picture that is not on disk, and why; and the other files written, of the same picture and of earlier ones.
-fn unwritten(state: &State, failed: &Unwritten) -> String {
+fn unwritten(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
         let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -148,7 +148,7 @@ pub(super) fn view(view: View) -> String {
 mod tests {
     use super::*;
     use crate::Changed;
-    use crate::fixtures::{Desk, diagnostic, done, progress};
+    use crate::fixtures::{TestUi, diagnostic, done, progress};
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::diagnostic::Severity;
 
@@ -163,123 +163,119 @@ mod tests {
 
     #[test]
     fn a_picture_that_is_written_while_a_newer_one_is_asked_for_is_named() {
-        let mut desk = Desk::new();
-        desk.finish([200, 30, 30]);
-        desk.press('r');
-        let begun = desk.state.request.generation;
-        desk.worker(Event::Started { generation: begun });
-        desk.worker(Event::Progress { generation: begun, progress: progress(0.5, None) });
-        desk.press('l');
-        desk.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
-        assert!(
-            words(&desk.state).starts_with("wrote big.png; the render after it"),
-            "{}",
-            words(&desk.state)
-        );
-        desk.worker(done(begun, Vec::new(), false));
-        desk.finish([30, 30, 200]);
+        let mut ui = TestUi::new();
+        ui.finish([200, 30, 30]);
+        ui.press('r');
+        let begun = ui.state.request.generation;
+        ui.worker(Event::Started { generation: begun });
+        ui.worker(Event::Progress { generation: begun, progress: progress(0.5, None) });
+        ui.press('l');
+        ui.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
+        assert!(words(&ui.state).starts_with("wrote big.png; the render after it"), "{}", words(&ui.state));
+        ui.worker(done(begun, Vec::new(), false));
+        ui.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), format!("{made}; the render after it is not finished (50 %)"));
-        assert!(desk.text().contains("not saved · w saves it"), "of the one at hand: {}", desk.text());
+        assert_eq!(words(&ui.state), format!("{made}; the render after it is not finished (50 %)"));
+        assert!(ui.text().contains("not saved · w saves it"), "of the one at hand: {}", ui.text());
     }
 
     #[test]
     fn the_seconds_are_those_of_the_picture_in_the_file() {
-        let mut desk = Desk::new();
-        let write = |desk: &mut Desk, seconds: f64, rendered: f64| {
-            let generation = desk.state.request.generation;
-            desk.worker(Event::Started { generation });
-            desk.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
-            desk.worker(done_as(generation, |report| {
+        let mut ui = TestUi::new();
+        let write = |ui: &mut TestUi, seconds: f64, rendered: f64| {
+            let generation = ui.state.request.generation;
+            ui.worker(Event::Started { generation });
+            ui.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
+            ui.worker(done_as(generation, |report| {
                 (report.seconds, report.image.render_seconds) = (seconds, rendered);
             }));
         };
-        write(&mut desk, 2.02, 2.0);
-        desk.press('r');
-        write(&mut desk, 1.02, 1.0);
-        desk.press('r');
-        write(&mut desk, 0.05, 2.0);
-        assert_eq!(words(&desk.state), "wrote dof.png: 640×480, 64 samples, 2.00 s");
+        write(&mut ui, 2.02, 2.0);
+        ui.press('r');
+        write(&mut ui, 1.02, 1.0);
+        ui.press('r');
+        write(&mut ui, 0.05, 2.0);
+        assert_eq!(words(&ui.state), "wrote dof.png: 640×480, 64 samples, 2.00 s");
     }
 
     #[test]
     fn a_view_that_was_written_is_said_to_be_one() {
-        let mut desk = Desk::new();
-        desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-        desk.finish([200, 30, 30]);
-        let own = words(&desk.state);
-        desk.press('v');
-        let generation = desk.state.request.generation;
-        desk.worker(Event::Started { generation });
-        desk.worker(done_as(generation, |report| {
+        let mut ui = TestUi::new();
+        ui.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.finish([200, 30, 30]);
+        let own = words(&ui.state);
+        ui.press('v');
+        let generation = ui.state.request.generation;
+        ui.worker(Event::Started { generation });
+        ui.worker(done_as(generation, |report| {
             (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
-        assert_eq!(words(&desk.state), own, "that is what is written");
-        desk.press('w');
-        desk.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
-        assert_eq!(words(&desk.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
+        assert_eq!(words(&ui.state), own, "that is what is written");
+        ui.press('w');
+        ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        assert_eq!(words(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
 
     #[test]
     fn a_save_that_is_only_shown_is_not_said_to_be_in_the_file() {
         let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
         for key in ['v', 'l'] {
-            let mut desk = Desk::new();
-            desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-            desk.finish([200, 30, 30]);
-            desk.press(key);
-            desk.finish([200, 30, 30]);
-            let before = words(&desk.state);
+            let mut ui = TestUi::new();
+            ui.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+            ui.finish([200, 30, 30]);
+            ui.press(key);
+            ui.finish([200, 30, 30]);
+            let before = words(&ui.state);
             assert!(before.starts_with(made) && !before.contains("save"), "{key}: {before}");
-            desk.event(crate::event::Event::Changed(Changed { noticed: desk.now }));
-            desk.finish([30, 30, 200]);
-            let after = words(&desk.state);
+            ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+            ui.finish([30, 30, 200]);
+            let after = words(&ui.state);
             assert_eq!(after, format!("{made} (older than your last edit)"), "{key}");
-            assert_eq!(not_kept(&desk.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
+            assert_eq!(not_kept(&ui.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
             // A save that changes nothing does not make it newer.
-            desk.event(crate::event::Event::Changed(Changed { noticed: desk.now }));
-            let generation = desk.state.request.generation;
-            desk.worker(Event::Started { generation });
-            desk.worker(done(generation, Vec::new(), true));
-            assert_eq!(words(&desk.state), after);
+            ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+            let generation = ui.state.request.generation;
+            ui.worker(Event::Started { generation });
+            ui.worker(done(generation, Vec::new(), true));
+            assert_eq!(words(&ui.state), after);
         }
     }
 
     #[test]
     fn what_could_not_be_written_is_told_whatever_is_shown_since() {
-        let mut desk = Desk::new();
-        let fail = |desk: &mut Desk| {
-            let generation = desk.state.request.generation;
-            desk.worker(Event::Started { generation });
-            desk.worker(Event::WriteFailed {
+        let mut ui = TestUi::new();
+        let fail = |ui: &mut TestUi| {
+            let generation = ui.state.request.generation;
+            ui.worker(Event::Started { generation });
+            ui.worker(Event::WriteFailed {
                 path: None,
                 generation,
                 message: "cannot write a.png: no space".to_owned(),
             });
-            desk.worker(finished(generation, Status::Skipped));
+            ui.worker(finished(generation, Status::Skipped));
         };
-        fail(&mut desk);
+        fail(&mut ui);
         let failed = "not written: cannot write a.png: no space";
         for key in ['l', 'v', '?'] {
-            desk.press(key);
-            let generation = desk.state.request.generation;
-            desk.worker(Event::Started { generation });
-            assert!(words(&desk.state).starts_with(failed), "{key}");
-            desk.worker(finished(generation, Status::Skipped));
-            assert!(words(&desk.state).starts_with(failed), "{key}");
+            ui.press(key);
+            let generation = ui.state.request.generation;
+            ui.worker(Event::Started { generation });
+            assert!(words(&ui.state).starts_with(failed), "{key}");
+            ui.worker(finished(generation, Status::Skipped));
+            assert!(words(&ui.state).starts_with(failed), "{key}");
         }
         // Back at the scene's own, where the disk has room or the picture of before.
-        desk.press('0');
+        ui.press('0');
         for status in [Status::Done, Status::Reused] {
-            fail(&mut desk);
-            assert_eq!(words(&desk.state), failed);
-            desk.press('r');
-            let generation = desk.state.request.generation;
-            desk.worker(Event::Started { generation });
-            desk.worker(finished(generation, status));
-            assert!(desk.state.saving.write_failed.is_none(), "{status:?}");
+            fail(&mut ui);
+            assert_eq!(words(&ui.state), failed);
+            ui.press('r');
+            let generation = ui.state.request.generation;
+            ui.worker(Event::Started { generation });
+            ui.worker(finished(generation, status));
+            assert!(ui.state.saving.write_failed.is_none(), "{status:?}");
         }
     }
 
@@ -294,134 +290,134 @@ mod tests {
 
     #[test]
     fn it_tells_what_was_written_and_what_was_not() {
-        let mut desk = Desk::new();
-        assert_eq!(words(&desk.state), "no image written");
+        let mut ui = TestUi::new();
+        assert_eq!(words(&ui.state), "no image written");
         let settings = Box::new(crate::fixtures::settings());
         let (camera, own) = (crate::fixtures::camera(), crate::fixtures::own());
-        desk.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own });
-        assert_eq!(words(&desk.state), "cornell.png not finished");
-        desk.worker(Event::Progress { generation: 1, progress: progress(0.388, None) });
-        assert_eq!(words(&desk.state), "cornell.png not finished (38 %)");
-        desk.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
-        desk.worker(done(1, Vec::new(), false));
+        ui.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own });
+        assert_eq!(words(&ui.state), "cornell.png not finished");
+        ui.worker(Event::Progress { generation: 1, progress: progress(0.388, None) });
+        assert_eq!(words(&ui.state), "cornell.png not finished (38 %)");
+        ui.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.worker(done(1, Vec::new(), false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), made);
-        desk.press('r');
-        desk.worker(Event::Started { generation: 2 });
-        desk.worker(done(2, Vec::new(), true));
-        assert_eq!(words(&desk.state), made, "nothing was rendered");
-        desk.press('r');
-        desk.worker(Event::Started { generation: 3 });
-        desk.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
-        assert_eq!(words(&desk.state), format!("{made}; the render after it was stopped at 50 %"));
-        desk.worker(Event::WriteFailed {
+        assert_eq!(words(&ui.state), made);
+        ui.press('r');
+        ui.worker(Event::Started { generation: 2 });
+        ui.worker(done(2, Vec::new(), true));
+        assert_eq!(words(&ui.state), made, "nothing was rendered");
+        ui.press('r');
+        ui.worker(Event::Started { generation: 3 });
+        ui.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
+        assert_eq!(words(&ui.state), format!("{made}; the render after it was stopped at 50 %"));
+        ui.worker(Event::WriteFailed {
             generation: 3,
             path: None,
             message: "cannot write b.exr: no space".to_owned(),
         });
-        desk.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
-        desk.worker(done(3, Vec::new(), false));
+        ui.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker(done(3, Vec::new(), false));
         let failed =
             "not written: cannot write b.exr: no space; wrote an earlier one to cornell.png; wrote a.png";
-        assert_eq!(words(&desk.state), failed);
-        desk.press('r');
-        desk.worker(Event::Started { generation: 4 });
-        desk.worker(Event::Written { generation: 4, path: "a.png".into(), bytes: 1, is_own: true });
-        desk.worker(done(4, Vec::new(), false));
+        assert_eq!(words(&ui.state), failed);
+        ui.press('r');
+        ui.worker(Event::Started { generation: 4 });
+        ui.worker(Event::Written { generation: 4, path: "a.png".into(), bytes: 1, is_own: true });
+        ui.worker(done(4, Vec::new(), false));
         let made = "wrote cornell.png, a.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), made);
-        desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
-        assert_eq!(words(&desk.state), format!("{made}; cornell.toml has errors since"));
+        assert_eq!(words(&ui.state), made);
+        ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
+        assert_eq!(words(&ui.state), format!("{made}; cornell.toml has errors since"));
     }
 
     #[test]
     fn changes_by_keys_are_listed_as_options_until_they_are_kept_or_written() {
-        let mut desk = Desk::new();
-        desk.finish([200, 30, 30]);
-        assert_eq!(not_kept(&desk.state), None);
+        let mut ui = TestUi::new();
+        ui.finish([200, 30, 30]);
+        assert_eq!(not_kept(&ui.state), None);
         for key in ['s', 'i', 'd', ']', '<', 'v'] {
-            desk.press(key);
-            desk.finish([200, 30, 30]);
+            ui.press(key);
+            ui.finish([200, 30, 30]);
         }
         let options = "not kept: --integrator path --shadows hard --dof off --view normal \
                        --set render.exposure=0.25 --set camera.fov=38.1";
-        assert_eq!(not_kept(&desk.state).as_deref(), Some(options));
-        desk.press('w');
-        let generation = desk.state.request.generation;
-        desk.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
-        assert_eq!(not_kept(&desk.state), None, "the image shows them");
-        desk.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
-        desk.press('l');
-        desk.finish([200, 30, 30]);
-        let words = not_kept(&desk.state).expect("moved since");
+        assert_eq!(not_kept(&ui.state).as_deref(), Some(options));
+        ui.press('w');
+        let generation = ui.state.request.generation;
+        ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        assert_eq!(not_kept(&ui.state), None, "the image shows them");
+        ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
+        ui.press('l');
+        ui.finish([200, 30, 30]);
+        let words = not_kept(&ui.state).expect("moved since");
         assert!(words.contains("--set 'camera.position=["), "{words}");
-        desk.press('0');
-        assert_eq!(not_kept(&desk.state), None);
+        ui.press('0');
+        assert_eq!(not_kept(&ui.state), None);
     }
 
     #[test]
     fn passing_by_the_own_image_leaves_its_file_finished() {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
-        let mut desk = Desk::new();
-        desk.worker(Event::Started { generation: 1 });
-        desk.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
-        desk.finish([200, 30, 30]);
-        desk.press('s');
-        desk.finish([30, 200, 30]);
+        let mut ui = TestUi::new();
+        ui.worker(Event::Started { generation: 1 });
+        ui.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.finish([200, 30, 30]);
+        ui.press('s');
+        ui.finish([30, 200, 30]);
         // The next key comes before the request of the own image ends.
-        desk.press('0');
-        desk.worker(Event::Started { generation: desk.state.request.generation });
-        assert_eq!(words(&desk.state), made);
-        desk.press(']');
-        assert_eq!(words(&desk.state), made);
+        ui.press('0');
+        ui.worker(Event::Started { generation: ui.state.request.generation });
+        assert_eq!(words(&ui.state), made);
+        ui.press(']');
+        assert_eq!(words(&ui.state), made);
         // Samples of another own image.
-        desk.press('0');
-        let generation = desk.state.request.generation;
-        desk.worker(Event::Started { generation });
-        desk.worker(Event::Progress { generation, progress: progress(0.2, None) });
-        assert_eq!(words(&desk.state), format!("{made}; the render after it was stopped at 20 %"));
-        desk.press(']');
-        assert_eq!(words(&desk.state), format!("{made}; the render after it is not finished (20 %)"));
+        ui.press('0');
+        let generation = ui.state.request.generation;
+        ui.worker(Event::Started { generation });
+        ui.worker(Event::Progress { generation, progress: progress(0.2, None) });
+        assert_eq!(words(&ui.state), format!("{made}; the render after it was stopped at 20 %"));
+        ui.press(']');
+        assert_eq!(words(&ui.state), format!("{made}; the render after it is not finished (20 %)"));
     }
 
     #[test]
     fn the_own_image_is_told_while_keys_show_something_else() {
-        let mut desk = Desk::new();
-        let own = |desk: &mut Desk, state| {
-            let generation = desk.state.request.generation;
-            desk.worker(Event::OwnImage { generation, state });
+        let mut ui = TestUi::new();
+        let own = |ui: &mut TestUi, state| {
+            let generation = ui.state.request.generation;
+            ui.worker(Event::OwnImage { generation, state });
         };
-        desk.worker(Event::Started { generation: 1 });
+        ui.worker(Event::Started { generation: 1 });
         let settings = Box::new(crate::fixtures::settings());
         let (camera, own_settings) = (crate::fixtures::camera(), crate::fixtures::own());
-        desk.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own: own_settings });
-        desk.worker(Event::Progress { generation: 1, progress: progress(0.108, None) });
-        desk.press('s');
-        own(&mut desk, OwnState::Begun { is_rendering: false });
-        desk.finish([200, 30, 30]);
-        assert_eq!(words(&desk.state), "cornell.png not finished (10 %)");
-        let said = crate::view::under::not_saved(&desk.state);
+        ui.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own: own_settings });
+        ui.worker(Event::Progress { generation: 1, progress: progress(0.108, None) });
+        ui.press('s');
+        own(&mut ui, OwnState::Begun { is_rendering: false });
+        ui.finish([200, 30, 30]);
+        assert_eq!(words(&ui.state), "cornell.png not finished (10 %)");
+        let said = crate::view::status_line::not_saved(&ui.state);
         assert_eq!(said, ["not saved · w saves it", "cornell.png at 10 %: 0 continues it"]);
-        assert!(desk.text().contains("not saved · w saves it"), "{}", desk.text());
+        assert!(ui.text().contains("not saved · w saves it"), "{}", ui.text());
         // `w` writes what is shown.
-        desk.press('w');
-        let generation = desk.state.request.generation;
-        desk.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
+        ui.press('w');
+        let generation = ui.state.request.generation;
+        ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
-        assert_eq!(words(&desk.state), made);
-        assert!(desk.text().contains("→ cornell.png"), "{}", desk.text());
+        assert_eq!(words(&ui.state), made);
+        assert!(ui.text().contains("→ cornell.png"), "{}", ui.text());
         // Back at the scene's own image, the file does not show it yet.
-        desk.press('0');
-        desk.worker(Event::Started { generation: desk.state.request.generation });
-        assert!(words(&desk.state).starts_with(&format!("{made}; the render after it was stopped")));
-        let generation = desk.state.request.generation;
-        desk.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
-        desk.finish([30, 200, 30]);
-        assert_eq!(words(&desk.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        desk.press('s');
-        own(&mut desk, OwnState::Written);
-        assert_eq!(words(&desk.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
-        desk.event(crate::event::Event::Changed(Changed { noticed: desk.now }));
-        assert!(words(&desk.state).ends_with(" (older than your last edit)"), "{}", words(&desk.state));
+        ui.press('0');
+        ui.worker(Event::Started { generation: ui.state.request.generation });
+        assert!(words(&ui.state).starts_with(&format!("{made}; the render after it was stopped")));
+        let generation = ui.state.request.generation;
+        ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
+        ui.finish([30, 200, 30]);
+        assert_eq!(words(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        ui.press('s');
+        own(&mut ui, OwnState::Written);
+        assert_eq!(words(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
+        assert!(words(&ui.state).ends_with(" (older than your last edit)"), "{}", words(&ui.state));
     }
 }

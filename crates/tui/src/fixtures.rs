@@ -9,10 +9,10 @@ use ratatui::layout::Rect;
 
 use super::color::{ColorDepth, XTERM};
 use super::event::{Effect, Event, KeyPress, Window};
-use super::known::Ask;
 use super::preview_kind::PreviewKind;
 use super::state::{Setup, State};
-use super::terminals::Abilities;
+use super::terminal_replies::TerminalQueries;
+use super::terminals::Capabilities;
 use super::update::{start, update};
 use super::view;
 use crate::film::Picture;
@@ -50,20 +50,20 @@ pub(super) fn state_with(
         depth,
         is_light: false,
         ansi: XTERM,
-        ask: Ask::default(),
-        abilities: Abilities::default(),
+        ask: TerminalQueries::default(),
+        abilities: Capabilities::default(),
         notify_after: Some(Duration::from_secs(30)),
     };
     State::new(setup, Instant::now())
 }
 
 /// A front end whose loop is the test.
-pub(super) struct Desk {
+pub(super) struct TestUi {
     pub state: State,
     pub now: Instant,
 }
 
-impl Desk {
+impl TestUi {
     /// 80×24, started.
     pub(super) fn new() -> Self {
         Self::with(state(80, 24))
@@ -97,7 +97,7 @@ impl Desk {
         self.event(Event::Tick)
     }
 
-    /// A render from beginning to end, its picture in one colour.
+    /// A render from beginning to end, its picture in one color.
     pub(super) fn finish(&mut self, color: [u8; 3]) {
         let generation = self.state.request.generation;
         self.worker(protocol::Event::Started { generation });

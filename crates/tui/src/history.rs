@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crate::film::Picture;
 use crate::pipeline::protocol::{PreviewSource, Section};
 use crate::rescale::resized;
-use crate::state::Origin;
+use crate::state::ImageOrigin;
 
 /// Bytes that all of them take, at most.
 const MOST_BYTES: usize = 16 << 20;
@@ -22,7 +22,7 @@ const UNFINISHED: &str = "unfinished";
 
 /// A picture and the request that it shows.
 #[derive(Clone, Debug)]
-pub(crate) struct Shown {
+pub(crate) struct ShownImage {
     pub generation: u64,
     pub picture: Arc<Picture>,
     /// Least and greatest number of the view, if the picture is stretched to them.
@@ -35,7 +35,7 @@ pub(crate) struct Shown {
     pub source: Option<PreviewSource>,
 }
 
-impl Shown {
+impl ShownImage {
     /// Whether both show the same image, whatever their samples and their size.
     pub(crate) fn is_of_same_image(&self, other: &Self) -> bool {
         let images = self.source.zip(other.source);
@@ -52,23 +52,23 @@ impl Shown {
 #[derive(Debug, Default)]
 pub(super) struct History {
     /// The oldest first.
-    past: VecDeque<Past>,
+    past: VecDeque<HistoryEntry>,
     /// Edits of the scene so far.
     edits: u64,
     /// The last edit whose scene could be read and may have changed the picture.
     read_edits: u64,
     /// Index of the picture that is looked at, and the newest picture meanwhile.
-    open: Option<(usize, Shown)>,
+    open: Option<(usize, ShownImage)>,
 }
 
 #[derive(Debug)]
-struct Past {
-    shown: Shown,
+struct HistoryEntry {
+    shown: ShownImage,
     /// Time at which its render last improved it.
     time: Instant,
     /// The last edit that it is after.
     edits: u64,
-    origin: Origin,
+    origin: ImageOrigin,
     /// Number of the run that finished it. `None` if none has.
     run: Option<u64>,
     /// Changes since the picture before: of files, then by keys. `None` for the first picture.
@@ -129,7 +129,7 @@ impl History {
     }
 
     /// Keeps a picture, in place of an earlier one of the same request, and of the last one if both show the same image.
-    pub(super) fn record(&mut self, shown: Shown, time: Instant, origin: Origin) {
+    pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageOrigin) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
         let is_last = |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same(&shown, &origin));
@@ -149,7 +149,7 @@ impl History {
             None => {
                 let edits = self.read_edits;
                 let (run, changes, small) = (None, None, OnceCell::new());
-                self.past.push_back(Past { shown, time, edits, origin, run, changes, small });
+                self.past.push_back(HistoryEntry { shown, time, edits, origin, run, changes, small });
                 self.compare(self.past.len() - 1);
             }
         }
@@ -159,7 +159,7 @@ impl History {
     }
 
     /// Puts a picture in the place of another one of its request or of its image.
-    fn replace(&mut self, at: usize, (shown, time): (Shown, Instant), origin: Origin) {
+    fn replace(&mut self, at: usize, (shown, time): (ShownImage, Instant), origin: ImageOrigin) {
         let Some(past) = self.past.get_mut(at) else { return };
         let is_other_picture = past.shown.picture != shown.picture;
         if is_other_picture {
@@ -211,7 +211,7 @@ impl History {
 
     /// Drops the picture of a request, unless a run has finished it.
     pub(super) fn drop_unfinished(&mut self, generation: u64) {
-        let is_it = |past: &Past| past.shown.generation == generation && past.run.is_none();
+        let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
         if let Some(at) = self.past.iter().position(is_it) {
             self.remove(at);
         }
@@ -241,7 +241,7 @@ impl History {
 
     /// Bytes of the pictures and of their scenes' texts, which pictures of one scene share.
     fn bytes(&self) -> usize {
-        let pictures: usize = self.past.iter().map(Past::bytes).sum();
+        let pictures: usize = self.past.iter().map(HistoryEntry::bytes).sum();
         let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
         let texts: HashMap<*const u8, usize> = texts.map(|text| (text.as_ptr(), text.len())).collect();
         pictures + texts.values().sum::<usize>()
@@ -261,7 +261,7 @@ impl History {
     }
 
     /// Scene and settings of the picture that is looked at. `None` if that is the newest one.
-    pub(super) fn origin_of_open(&self) -> Option<&Origin> {
+    pub(super) fn origin_of_open(&self) -> Option<&ImageOrigin> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
@@ -277,12 +277,12 @@ impl History {
     }
 
     /// The newest picture, while an older one is looked at.
-    pub(super) fn newest(&self) -> Option<Shown> {
+    pub(super) fn newest(&self) -> Option<ShownImage> {
         self.open.as_ref().map(|(_, newest)| newest.clone())
     }
 
     /// There is a newer picture: whether an older one is looked at, so that it waits.
-    pub(super) fn holds_back(&mut self, shown: &Shown) -> bool {
+    pub(super) fn holds_back(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
         }
@@ -290,7 +290,7 @@ impl History {
     }
 
     /// Goes so many pictures back; negative: forward.
-    pub(super) fn step(&mut self, back: isize, newest: Shown) -> Option<Shown> {
+    pub(super) fn step(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
         self.look_at(next, newest)
@@ -303,7 +303,7 @@ impl History {
     }
 
     /// The last picture from before the last edit that changed the picture.
-    pub(super) fn before_edit(&mut self, newest: Shown) -> Option<Shown> {
+    pub(super) fn before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
         self.look_at(at, newest)
@@ -349,18 +349,18 @@ impl History {
     }
 
     /// One of the pictures that are kept.
-    pub(super) fn open_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
+    pub(super) fn open_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
         self.look_at(at, newest)
     }
 
-    fn look_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
+    fn look_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
         let shown = self.past.get(at)?.shown.clone();
         self.open = Some((at, newest));
         Some(shown)
     }
 
     /// Back to the newest one.
-    pub(super) fn close(&mut self) -> Option<Shown> {
+    pub(super) fn close(&mut self) -> Option<ShownImage> {
         self.open.take().map(|(_, newest)| newest)
     }
 
@@ -371,9 +371,9 @@ impl History {
     }
 }
 
-impl Past {
+impl HistoryEntry {
     /// Whether another picture is the same one. A picture in progress is not the finished one that it will be.
-    fn is_same(&self, shown: &Shown, origin: &Origin) -> bool {
+    fn is_same(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
             self.shown.is_of_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
         // What is rendered may begin as it is and become another one.
@@ -416,8 +416,8 @@ mod tests {
     use crate::scene::fingerprint::Fingerprint;
     use crate::state::Toggles;
 
-    fn shown(generation: u64, side: u32) -> Shown {
-        Shown {
+    fn shown(generation: u64, side: u32) -> ShownImage {
+        ShownImage {
             generation,
             picture: plain_picture(side, side, [1, 2, 3]),
             range: None,
@@ -432,10 +432,14 @@ mod tests {
         let mut history = History::default();
         for generation in 0..10 {
             let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
-            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), Origin::default());
+            history.record(
+                ShownImage { picture, ..shown(generation, 1) },
+                Instant::now(),
+                ImageOrigin::default(),
+            );
         }
         assert_eq!(history.past.len(), 5, "3 MB each");
-        history.record(shown(10, 10_000), Instant::now(), Origin::default());
+        history.record(shown(10, 10_000), Instant::now(), ImageOrigin::default());
         assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
     }
 
@@ -445,8 +449,8 @@ mod tests {
         let shared: Arc<str> = "x".repeat(3 << 20).into();
         let mut record = |generation: u64, text: Arc<str>| {
             let picture = plain_picture(1, 1, [generation as u8, 0, 0]);
-            let origin = Origin { text: Some(text), ..Origin::default() };
-            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), origin);
+            let origin = ImageOrigin { text: Some(text), ..ImageOrigin::default() };
+            history.record(ShownImage { picture, ..shown(generation, 1) }, Instant::now(), origin);
             history.past.len()
         };
         assert_eq!((0..8).map(|generation| record(generation, Arc::clone(&shared))).max(), Some(8));
@@ -460,7 +464,7 @@ mod tests {
         let mut history = History::default();
         for generation in 0..3 {
             history.edited();
-            history.record(shown(generation, 10), Instant::now(), Origin::default());
+            history.record(shown(generation, 10), Instant::now(), ImageOrigin::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
@@ -468,38 +472,38 @@ mod tests {
     /// More samples of the same picture begin with that picture.
     #[test]
     fn an_unfinished_picture_is_not_the_finished_one_that_it_begins_with() {
-        let unfinished = Origin { is_unfinished: true, ..Origin::default() };
+        let unfinished = ImageOrigin { is_unfinished: true, ..ImageOrigin::default() };
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         history.record(shown(2, 10), Instant::now(), unfinished.clone());
         let generations = |history: &History| -> Vec<u64> {
             history.past.iter().map(|past| past.shown.generation).collect()
         };
         assert_eq!(generations(&history), [1, 2]);
-        let better = Shown { picture: plain_picture(10, 10, [1, 2, 4]), ..shown(2, 10) };
+        let better = ShownImage { picture: plain_picture(10, 10, [1, 2, 4]), ..shown(2, 10) };
         history.record(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
         // In the end it may be the same after all.
-        history.record(shown(2, 10), Instant::now(), Origin::default());
+        history.record(shown(2, 10), Instant::now(), ImageOrigin::default());
         assert_eq!(generations(&history), [2]);
     }
 
     #[test]
     fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
-        history.record(shown(2, 20), Instant::now(), Origin::default());
+        history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
         // A scene that is broken, and mended.
         edit(&mut history);
         history.broken();
         edit(&mut history);
-        history.record(shown(4, 20), Instant::now(), Origin::default());
+        history.record(shown(4, 20), Instant::now(), ImageOrigin::default());
         let before = history.before_edit(shown(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
         // Pictures by keys are after the same edit.
         history.close();
-        history.record(shown(5, 30), Instant::now(), Origin::default());
+        history.record(shown(5, 30), Instant::now(), ImageOrigin::default());
         let before = history.before_edit(shown(5, 30)).expect("a picture");
         assert_eq!(before.generation, 1);
     }
@@ -507,22 +511,22 @@ mod tests {
     #[test]
     fn pictures_of_the_last_good_scene_are_not_after_the_edit_that_broke_it() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
-        history.record(shown(2, 20), Instant::now(), Origin::default());
+        history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
         history.edited();
         history.broken();
-        history.record(shown(3, 30), Instant::now(), Origin::default());
+        history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
         assert_eq!(history.before_edit(shown(3, 30)).expect("a picture").generation, 1);
     }
 
     /// A picture of an image, whose samples are there in part or all.
-    fn of_image(generation: u64, name: &str, is_finished: bool) -> (Shown, Origin) {
+    fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
         let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
         // No two previews are alike to the bit.
         let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
-        let origin = Origin { is_unfinished: !is_finished, ..Origin::default() };
-        (Shown { source, picture, ..shown(generation, 10) }, origin)
+        let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };
+        (ShownImage { source, picture, ..shown(generation, 10) }, origin)
     }
 
     #[test]
@@ -577,9 +581,9 @@ mod tests {
     #[test]
     fn a_camera_that_was_kept_is_an_edit() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Origin::default());
-        history.record(shown(2, 20), Instant::now(), Origin::default());
-        history.record(shown(3, 30), Instant::now(), Origin::default());
+        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
         history.kept_camera(2);
         let before = history.before_edit(shown(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "of the camera before");
@@ -588,15 +592,15 @@ mod tests {
     #[test]
     fn one_request_has_one_picture() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Origin::default());
-        history.record(shown(1, 20), Instant::now(), Origin::default());
+        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown(1, 20), Instant::now(), ImageOrigin::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
     /// A scene with this text, and settings by keys.
-    fn origin(text: &str, view: Option<View>) -> Origin {
+    fn origin(text: &str, view: Option<View>) -> ImageOrigin {
         let toggles = Toggles { view, ..Toggles::default() };
-        Origin { toggles, text: Some(text.into()), ..Origin::default() }
+        ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }
     }
 
     fn changes(history: &History) -> Vec<String> {
@@ -630,7 +634,7 @@ mod tests {
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = Toggles { camera, ..Toggles::default() };
         history.record(shown(1, 10), Instant::now(), origin("camera.fov = 40", None));
-        let before = Origin { toggles: moved, ..origin("camera.fov = 40", None) };
+        let before = ImageOrigin { toggles: moved, ..origin("camera.fov = 40", None) };
         history.record(shown(2, 20), Instant::now(), before.clone());
         history.record(shown(3, 30), Instant::now(), origin("camera.fov = 30", None));
         history.record(shown(4, 40), Instant::now(), before);
@@ -651,7 +655,7 @@ mod tests {
         let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
             let (shown, origin) = of_image(generation, name, is_finished);
             let toggles = Toggles { photons, ..Toggles::default() };
-            history.record(shown, Instant::now(), Origin { toggles, text: Some(text.into()), ..origin });
+            history.record(shown, Instant::now(), ImageOrigin { toggles, text: Some(text.into()), ..origin });
         };
         let (first, second) = ("render.samples = 64", "render.samples = 16");
         record(&mut history, 1, "on", true, first, None);
@@ -676,7 +680,11 @@ mod tests {
         let (shown, origin) = of_image(7, "fov", true);
         let moved = Toggles { camera, photons: Some(true), ..Toggles::default() };
         let before = "render.samples = 8\nradius = 1";
-        history.record(shown, Instant::now(), Origin { toggles: moved, text: Some(before.into()), ..origin });
+        history.record(
+            shown,
+            Instant::now(),
+            ImageOrigin { toggles: moved, text: Some(before.into()), ..origin },
+        );
         assert_eq!(changes(&history)[4], "camera moved");
         record(&mut history, 8, "fov", true, text, Some(true));
         assert_eq!(changes(&history)[4], "+ camera");
@@ -691,7 +699,11 @@ mod tests {
             // Shown on its way, at the end, and once more.
             for _ in 0..3 {
                 let (shown, origin) = of_image(generation, name, true);
-                history.record(shown, Instant::now(), Origin { toggles, text: Some(text.into()), ..origin });
+                history.record(
+                    shown,
+                    Instant::now(),
+                    ImageOrigin { toggles, text: Some(text.into()), ..origin },
+                );
             }
             edit(history);
             changes(history)
@@ -726,7 +738,7 @@ mod tests {
         };
         let mut history = History::default();
         for (number, (bricks, knot)) in (1..).zip([(1, 1), (2, 1), (2, 1), (3, 2)]) {
-            let origin = Origin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
+            let origin = ImageOrigin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
             history.record(shown(number, 10 * number as u32), Instant::now(), origin);
         }
         let words = ["first", "bricks.png changed", "rendered again", "bricks.png changed; knot.obj changed"];
@@ -736,11 +748,11 @@ mod tests {
     #[test]
     fn small_pictures_are_made_anew_when_their_pictures_change() {
         let mut history = History::default();
-        history.record(shown(1, 1000), Instant::now(), Origin::default());
+        history.record(shown(1, 1000), Instant::now(), ImageOrigin::default());
         let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
         assert_eq!(size(&history), Some((32, [1, 2, 3])));
         let picture = plain_picture(10, 10, [9, 8, 7]);
-        history.record(Shown { picture, ..shown(1, 1) }, Instant::now(), Origin::default());
+        history.record(ShownImage { picture, ..shown(1, 1) }, Instant::now(), ImageOrigin::default());
         assert_eq!(size(&history), Some((10, [9, 8, 7])));
     }
 

@@ -6,33 +6,34 @@
 
 mod action;
 mod camera;
-mod chrome;
 mod color;
+mod connection;
 mod display;
 mod editor;
 mod environment;
 mod event;
 mod exit_summary;
-mod files;
+mod file_urls;
 mod graphics;
 mod history;
 mod input;
 mod keymap;
-mod known;
-mod line;
 mod mosaic;
 mod noise_curve;
 mod options;
 pub mod paint;
-mod pixels;
+mod pixel_request;
 mod presenter;
 mod preview_kind;
-mod printed;
+mod terminal_replies;
+mod window_title;
+
 mod probe;
 mod rescale;
 mod run;
 mod signals;
 mod state;
+mod static_image;
 mod terminal;
 mod terminals;
 mod update;
@@ -40,9 +41,9 @@ mod view;
 mod writer;
 
 #[cfg(test)]
-mod by_hand;
-#[cfg(test)]
 mod fixtures;
+#[cfg(test)]
+mod manual_test;
 #[cfg(test)]
 mod tests;
 
@@ -55,9 +56,9 @@ pub use color::{ColorChoice, ColorDepth, in_xterm};
 pub use editor::editor;
 pub use graphics::PixelScreen;
 pub use mosaic::filled;
-pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};
-pub use printed::{Named, printed};
-pub use probe::{Answers, Probe, probe};
+pub use options::{Changed, ExitStatus, News, Options, PreviewChoice, TuiError, TuiOutcome};
+pub use probe::{Probe, ProbeReplies, probe};
 pub use run::run;
+pub use static_image::{NamedImage, images_as_text};
 pub use view::preview::shown;
 pub use view::text::wrapped;

@@ -13,11 +13,11 @@ pub use crate::pipeline::watch::{Changed, Lost, News, OutputChange};
 choice! {
     /// Choice of how the preview is drawn.
     pub enum PreviewChoice {
-        /// The finest blocks that the terminal is known to have if it has colours, else characters.
+        /// The finest blocks that the terminal is known to have if it has colors, else characters.
         Auto = "auto",
         /// Two pixels a cell.
         HalfBlock = "halfblock",
-        /// Two colours a cell, in quarters.
+        /// Two colors a cell, in quarters.
         Quadrant = "quadrant",
         /// The same in sixths: what Unicode 13 has.
         Sextant = "sextant",
@@ -42,7 +42,7 @@ pub struct Options {
     pub scene: PathBuf,
     /// Overrides of the command line; the keys change more on top.
     pub overrides: Overrides,
-    /// Choice of colours.
+    /// Choice of colors.
     pub color: ColorChoice,
     /// Choice of how the preview is drawn.
     pub preview: PreviewChoice,
@@ -84,7 +84,7 @@ impl ExitStatus {
 
 /// Result of the front end.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ended {
+pub struct TuiOutcome {
     /// Exit code of the program.
     pub status: ExitStatus,
     /// Whether a person ordered an image and does not know the outcome yet.

@@ -9,15 +9,15 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::chrome::Chrome;
 use super::display::Display;
 use super::event::Event;
-use super::files::Files;
-use super::paint::{Advice, Besides, Fidelity, Link, Moment, advise};
+use super::file_urls::FileUrls;
+use super::paint::{Fidelity, FrameExtras, FrameTiming, Hyperlink, PacingAdvice, advise};
 use super::state::State;
 use super::view;
-use super::view::Drawn;
+use super::view::ViewExtras;
 use super::view::layout::Layout;
+use super::window_title::WindowTitle;
 use crate::film::Picture;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
 
@@ -27,10 +27,10 @@ const FRAME: Duration = Duration::from_millis(50);
 /// Leads the terminal to the state.
 pub(super) struct Presenter {
     pub(super) display: Display,
-    drawn: Aimed,
+    drawn: DrawnPreview,
     previews: PreviewSlot,
     /// Addresses of written files.
-    files: Files,
+    files: FileUrls,
     /// No frame before this.
     next_frame: Instant,
     /// The newest request of which a picture was drawn.
@@ -39,7 +39,7 @@ pub(super) struct Presenter {
 
 /// The picture that was drawn last.
 #[derive(Default)]
-struct Aimed {
+struct DrawnPreview {
     picture: Option<Arc<Picture>>,
     generation: u64,
     /// Samples of a pixel, in the mean.
@@ -58,14 +58,21 @@ struct Aimed {
 
 impl Presenter {
     pub(super) fn new(display: Display, previews: PreviewSlot, now: Instant) -> Self {
-        Self { display, drawn: Aimed::default(), previews, files: Files::here(), next_frame: now, newest: 0 }
+        Self {
+            display,
+            drawn: DrawnPreview::default(),
+            previews,
+            files: FileUrls::here(),
+            next_frame: now,
+            newest: 0,
+        }
     }
 
     /// Takes note of a newer picture and gives it if it is to be drawn. Until it is worth its bytes it stays in the slot,
     /// where a still newer one takes its place: the line carries whole pictures, and never a queue of them.
     pub(super) fn preview(&mut self, generation: u64, state: &State, now: Instant) -> Option<Event> {
         let is_same_request = generation == self.drawn.generation && !self.is_other(state);
-        if is_same_request && self.advice(state, now) == Advice::Wait {
+        if is_same_request && self.advice(state, now) == PacingAdvice::Wait {
             self.drawn.is_old = true;
             return None;
         }
@@ -84,16 +91,16 @@ impl Presenter {
     }
 
     /// Says what to do with a picture of the same request as the one that is drawn.
-    fn advice(&self, state: &State, now: Instant) -> Advice {
+    fn advice(&self, state: &State, now: Instant) -> PacingAdvice {
         advise(&self.moment(state, now))
     }
 
-    fn moment(&self, state: &State, now: Instant) -> Moment {
+    fn moment(&self, state: &State, now: Instant) -> FrameTiming {
         let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
         let is_quick = self.display.is_quick();
         let is_shown = if is_quick { self.display.is_answered() } else { self.display.is_complete() };
-        Moment {
+        FrameTiming {
             bytes_per_second: self.display.bytes_per_second(),
             cells: picture.map_or(0, |picture| self.cells(state, picture)),
             samples: samples(state),
@@ -146,7 +153,7 @@ impl Presenter {
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
-        if let Some(chrome) = Chrome::of(state, self.display.bytes_per_second().is_some()) {
+        if let Some(chrome) = WindowTitle::of(state, self.display.bytes_per_second().is_some()) {
             self.display.dress(chrome);
         }
         let is_new = self.note_picture(state, now);
@@ -159,10 +166,10 @@ impl Presenter {
     }
 
     /// Links, if the terminal has them, and what waits for the picture.
-    fn besides(&self, state: &State, drawn: Drawn) -> Besides {
+    fn besides(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
         let files = drawn.files.into_iter().filter(|_| state.display.abilities.links);
-        let link = |(cells, path): (Rect, PathBuf)| Link { cells, address: self.files.address(&path) };
-        Besides { later: drawn.later, links: files.map(link).collect() }
+        let link = |(cells, path): (Rect, PathBuf)| Hyperlink { cells, address: self.files.address(&path) };
+        FrameExtras { later: drawn.later, links: files.map(link).collect() }
     }
 
     /// Whether the line is idle between two previews while a key moves the camera: the last one is on the screen, as exactly as a
@@ -185,7 +192,7 @@ impl Presenter {
             self.newest = generation;
             self.display.begin_count();
         }
-        self.drawn = Aimed { picture, generation, samples, at, is_first, ..Aimed::default() };
+        self.drawn = DrawnPreview { picture, generation, samples, at, is_first, ..DrawnPreview::default() };
         true
     }
 
@@ -203,10 +210,10 @@ impl Presenter {
     pub(super) fn pump(&mut self, state: &State, now: Instant, is_late: impl Fn() -> bool) -> Vec<Event> {
         let has_sent = self.display.pump(now, is_late);
         let mut events: Vec<Event> = self.display.take_report().map(Event::Frame).into_iter().collect();
-        if self.drawn.is_old && self.advice(state, now) != Advice::Wait {
+        if self.drawn.is_old && self.advice(state, now) != PacingAdvice::Wait {
             events.extend(self.take_preview());
         }
-        let is_new = |drawn: &mut Aimed| !std::mem::replace(&mut drawn.is_shown, true);
+        let is_new = |drawn: &mut DrawnPreview| !std::mem::replace(&mut drawn.is_shown, true);
         if self.drawn.picture.is_some() && has_sent && is_new(&mut self.drawn) {
             events.push(Event::Shown { generation: self.drawn.generation });
         }
@@ -229,7 +236,7 @@ fn samples(state: &State) -> f64 {
 
 /// Whether the newest picture stays as it is.
 fn is_still(state: &State) -> bool {
-    state.work.paused || !state.work.is_running() && view::under::goes_on(state).is_none()
+    state.work.paused || !state.work.is_running() && view::status_line::goes_on(state).is_none()
 }
 
 /// When the state is to be drawn or told of the time.

@@ -4,7 +4,7 @@ use super::color::ColorDepth;
 use super::graphics::Protocol;
 use super::mosaic::Grid;
 use super::options::PreviewChoice;
-use super::pixels::PixelRequest;
+use super::pixel_request::PixelRequest;
 
 /// Kinds of previews.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +24,7 @@ impl PreviewKind {
     pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
-            // Without colours half blocks are a uniform wall.
+            // Without colors half blocks are a uniform wall.
             PreviewChoice::Ascii => Self::Ascii,
             PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
             PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_colours_the_preview_is_a_ramp() {
+    fn without_colors_the_preview_is_a_ramp() {
         assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(PreviewKind::of(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);

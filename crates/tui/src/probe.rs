@@ -10,11 +10,11 @@ use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
 use super::environment::{is_plain, way};
-use super::input::{Decoder, Input};
-use super::known::{Answer, Ask, Blocks};
-use super::pixels::KITTY_QUERY;
+use super::input::{DecodedInput, Decoder};
+use super::pixel_request::KITTY_QUERY;
 use super::terminal;
-use super::terminals::{Brand, Terminal};
+use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
+use super::terminals::{Brand, TerminalId};
 
 /// Answers of a terminal, and what its environment says.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct Probe {
     pub cells: (u16, u16),
     /// Width and height of a cell in pixels, as far as the terminal says.
     pub cell_pixels: (u16, u16),
-    /// Colours by the environment.
+    /// Colors by the environment.
     pub depth: ColorDepth,
     /// Whether tmux or screen lies between.
     pub is_multiplexed: bool,
@@ -32,17 +32,17 @@ pub struct Probe {
     /// Whether it shows images by iTerm2's protocol, by its name in the environment.
     pub has_iterm: bool,
     /// The terminal's answers. `None` if it gives none.
-    pub answers: Option<Answers>,
+    pub answers: Option<ProbeReplies>,
 }
 
 /// Answers of a terminal.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Answers {
+pub struct ProbeReplies {
     /// Time from a status report's request to its answer.
     pub round_trip: Duration,
     /// Name and version (XTVERSION).
     pub name: Option<String>,
-    /// Whether it has 24 bits of colour (XTGETTCAP).
+    /// Whether it has 24 bits of color (XTGETTCAP).
     pub has_true_color: bool,
     /// Whether it shows images by kitty's protocol.
     pub has_kitty: bool,
@@ -58,12 +58,12 @@ impl Probe {
     /// The parts of a cell that a preview without a choice draws, in words.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
-        let terminal = name.filter(|_| !self.is_multiplexed).and_then(Terminal::of_report);
-        match (self.depth, terminal.map_or(Blocks::Unknown, Blocks::of)) {
+        let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::of_report);
+        match (self.depth, terminal.map_or(BlockGlyphs::Unknown, BlockGlyphs::of)) {
             (ColorDepth::None, _) => "characters",
-            (_, Blocks::Octants) => "octants",
-            (_, Blocks::Sextants) => "sextants",
-            (_, Blocks::Unknown) => "half blocks",
+            (_, BlockGlyphs::Octants) => "octants",
+            (_, BlockGlyphs::Sextants) => "sextants",
+            (_, BlockGlyphs::Unknown) => "half blocks",
         }
     }
 }
@@ -83,7 +83,7 @@ pub fn probe() -> Option<Probe> {
     let questions = if is_plain(variable) || way.is_multiplexed {
         Vec::new()
     } else {
-        let ask = Ask {
+        let ask = TerminalQueries {
             blocks: true,
             name: true,
             true_color: true,
@@ -108,7 +108,7 @@ pub fn probe() -> Option<Probe> {
 }
 
 /// Sends questions in raw mode, and gives the modes back.
-fn ask(questions: &[u8]) -> io::Result<Option<Answers>> {
+fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let stdin = io::stdin();
     let before = tcgetattr(&stdin)?;
     let mut raw = before.clone();
@@ -121,16 +121,16 @@ fn ask(questions: &[u8]) -> io::Result<Option<Answers>> {
     answers
 }
 
-fn converse(questions: &[u8]) -> io::Result<Option<Answers>> {
-    let (begin, mut heard) = (Instant::now(), Heard::default());
+fn converse(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
+    let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
-    if !listen(&mut heard, begin, |heard| heard.has(Answer::Ready))? {
+    if !listen(&mut heard, begin, |heard| heard.has(TerminalReply::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
-    listen(&mut heard, Instant::now(), |heard| heard.has(Answer::Attributes))?;
-    Ok(Some(Answers { round_trip, ..heard.answers() }))
+    listen(&mut heard, Instant::now(), |heard| heard.has(TerminalReply::Attributes))?;
+    Ok(Some(ProbeReplies { round_trip, ..heard.answers() }))
 }
 
 fn send(bytes: &[u8]) -> io::Result<()> {
@@ -140,7 +140,11 @@ fn send(bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Reads until all is heard, or it takes too long; whether it is.
-fn listen(heard: &mut Heard, begin: Instant, is_all: impl Fn(&Heard) -> bool) -> io::Result<bool> {
+fn listen(
+    heard: &mut ReceivedReplies,
+    begin: Instant,
+    is_all: impl Fn(&ReceivedReplies) -> bool,
+) -> io::Result<bool> {
     let stdin = io::stdin();
     let mut bytes = [0; 4096];
     while !is_all(heard) {
@@ -160,49 +164,49 @@ fn listen(heard: &mut Heard, begin: Instant, is_all: impl Fn(&Heard) -> bool) ->
 
 /// Bytes from the terminal, and the answers in them.
 #[derive(Default)]
-struct Heard {
+struct ReceivedReplies {
     decoder: Decoder,
-    answers: Vec<Answer>,
+    answers: Vec<TerminalReply>,
     /// All of it, for what the front end does not ask for.
     bytes: Vec<u8>,
 }
 
-impl Heard {
+impl ReceivedReplies {
     fn hear(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
         let answer = |input| match input {
-            Input::Answer(answer) => Some(answer),
-            Input::Key(_) | Input::Mouse(_) | Input::Paste => None,
+            DecodedInput::TerminalReply(answer) => Some(answer),
+            DecodedInput::Key(_) | DecodedInput::Mouse(_) | DecodedInput::Paste => None,
         };
         self.answers.extend(self.decoder.decode(bytes, Instant::now()).into_iter().filter_map(answer));
     }
 
-    fn has(&self, answer: Answer) -> bool {
+    fn has(&self, answer: TerminalReply) -> bool {
         self.answers.contains(&answer)
     }
 
     /// The answers among all that was heard.
-    fn answers(&self) -> Answers {
-        let background = |answer: &Answer| match answer {
-            Answer::Background(rgb) => Some(*rgb),
-            Answer::Ready
-            | Answer::Attributes
-            | Answer::Synchronized { .. }
-            | Answer::Name(_)
-            | Answer::Focus { .. }
-            | Answer::TrueColor
-            | Answer::Ink { .. }
-            | Answer::Images(_)
-            | Answer::Other => None,
+    fn answers(&self) -> ProbeReplies {
+        let background = |answer: &TerminalReply| match answer {
+            TerminalReply::Background(rgb) => Some(*rgb),
+            TerminalReply::Ready
+            | TerminalReply::Attributes
+            | TerminalReply::Synchronized { .. }
+            | TerminalReply::Name(_)
+            | TerminalReply::Focus { .. }
+            | TerminalReply::TrueColor
+            | TerminalReply::Ink { .. }
+            | TerminalReply::Images(_)
+            | TerminalReply::Other => None,
         };
         let attributes = self.between(b"\x1b[?", b'c').unwrap_or_default();
-        Answers {
+        ProbeReplies {
             round_trip: Duration::ZERO,
             name: self.between(b"\x1bP>|", 0x1b),
-            has_true_color: self.has(Answer::TrueColor),
+            has_true_color: self.has(TerminalReply::TrueColor),
             has_kitty: self.between(b"\x1b_Gi=4211;", 0x1b).is_some_and(|text| text == "OK"),
             has_sixel: attributes.split(';').any(|attribute| attribute == "4"),
-            is_synchronized: self.has(Answer::Synchronized { is_known: true }),
+            is_synchronized: self.has(TerminalReply::Synchronized { is_known: true }),
             background: self.answers.iter().find_map(background),
         }
     }
@@ -222,8 +226,8 @@ impl Heard {
 mod tests {
     use super::*;
 
-    fn heard(bytes: &[u8]) -> Heard {
-        let mut heard = Heard::default();
+    fn heard(bytes: &[u8]) -> ReceivedReplies {
+        let mut heard = ReceivedReplies::default();
         heard.hear(bytes);
         heard
     }
@@ -237,13 +241,13 @@ mod tests {
         assert_eq!(answers.name.as_deref(), Some("foot(1.20.2)"));
         assert_eq!(answers.background, Some([0x1c; 3]));
         assert!(answers.has_true_color && answers.has_kitty && answers.has_sixel && answers.is_synchronized);
-        assert!(heard.has(Answer::Ready) && heard.has(Answer::Attributes));
+        assert!(heard.has(TerminalReply::Ready) && heard.has(TerminalReply::Attributes));
     }
 
     #[test]
     fn refusals_are_no_abilities() {
         let refused = heard(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
-        assert_eq!(refused.answers(), Answers::default());
-        assert!(!heard(b"\x1b[?62;").has(Answer::Attributes));
+        assert_eq!(refused.answers(), ProbeReplies::default());
+        assert!(!heard(b"\x1b[?62;").has(TerminalReply::Attributes));
     }
 }

@@ -7,20 +7,20 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::color::{self, ColorDepth};
-use super::display::{Display, Way};
+use super::display::{Display, TerminalLink};
 use super::editor;
 use super::environment::{ask, way};
-use super::event::FilePlace;
-use super::event::{Effect, Event, Source};
+use super::event::FilePosition;
+use super::event::{Effect, Event, EventSource};
 use super::exit_summary;
 use super::input;
-use super::options::{Ended, ExitStatus, Options, TuiError};
+use super::options::{ExitStatus, Options, TuiError, TuiOutcome};
 use super::presenter::Presenter;
 use super::preview_kind::PreviewKind;
 use super::signals::{self, Listener};
 use super::state::{Setup, State};
-use super::terminal::{self, Screen};
-use super::terminals::Terminal;
+use super::terminal::{self, TerminalSession};
+use super::terminals::TerminalId;
 use super::update::{start, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
@@ -33,21 +33,21 @@ const TURN: Duration = Duration::from_millis(3);
 ///
 /// # Errors
 /// [`TuiError`] if there is no terminal, if it cannot be written to, or if the worker is gone.
-pub fn run(options: Options) -> Result<Ended, TuiError> {
+pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     terminal::require()?;
     let depth = color::depth(options.color, |name| std::env::var(name).ok());
-    // Otherwise crossterm drops colours by name if NO_COLOR is set.
+    // Otherwise crossterm drops colors by name if NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
     let listener = Listener::start(&sender).map_err(failed("hear signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
-    let abilities = Terminal::of_environment(variable).map(Terminal::abilities).unwrap_or_default();
+    let abilities = TerminalId::of_environment(variable).map(TerminalId::abilities).unwrap_or_default();
     if abilities.focus {
         terminal::will_report_focus();
     }
-    let screen = Screen::open()?;
-    let way = Way { ask: ask(options.preview, options.color, depth, variable), ..way(variable) };
+    let screen = TerminalSession::open()?;
+    let way = TerminalLink { ask: ask(options.preview, options.color, depth, variable), ..way(variable) };
     let setup = Setup {
         scene: options.scene,
         overrides: options.overrides,
@@ -60,8 +60,8 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
         abilities,
         notify_after: options.notify_after,
     };
-    forward("worker-events", options.events, &sender, Event::Worker, Source::Worker)?;
-    forward("news", options.news, &sender, Event::of_watcher, Source::Watcher)?;
+    forward("worker-events", options.events, &sender, Event::Worker, EventSource::Worker)?;
+    forward("news", options.news, &sender, Event::of_watcher, EventSource::Watcher)?;
     input::start(&sender).map_err(failed("read keys from"))?;
     writer::start(&sender).map_err(failed("write to"))?;
 
@@ -91,7 +91,7 @@ fn forward<T: Send + 'static>(
     from: Receiver<T>,
     events: &Sender<Event>,
     wrap: impl Fn(T) -> Event + Send + 'static,
-    source: Source,
+    source: EventSource,
 ) -> Result<(), TuiError> {
     let events = events.clone();
     let pass = move || {
@@ -107,7 +107,7 @@ fn forward<T: Send + 'static>(
 }
 
 struct Ui {
-    screen: Screen,
+    screen: TerminalSession,
     presenter: Presenter,
     events: Receiver<Event>,
     /// Events that came while the loop waited for answers.
@@ -118,40 +118,40 @@ struct Ui {
 }
 
 /// Ends of the loop.
-enum End {
+enum LoopEnd {
     Quit(ExitStatus),
     Error(TuiError),
 }
 
 impl Ui {
-    fn run(mut self) -> Result<Ended, TuiError> {
+    fn run(mut self) -> Result<TuiOutcome, TuiError> {
         let effects = start(&mut self.state);
         let mut end = self.perform(effects);
         while end.is_none() {
             end = self.present().or_else(|| self.wait());
         }
         // What the person did not end is gone on with later: a signal came, or the terminal is gone or broken.
-        if !matches!(&end, Some(End::Quit(ExitStatus::QUIT))) {
+        if !matches!(&end, Some(LoopEnd::Quit(ExitStatus::QUIT))) {
             (self.commands)(Command::Suspend);
         }
         (self.commands)(Command::Quit);
         let status = match end {
             // Whoever sends SIGHUP by hand still has the terminal and wants it back.
-            Some(End::Quit(ExitStatus::HANGUP)) => {
+            Some(LoopEnd::Quit(ExitStatus::HANGUP)) => {
                 if !terminal::is_there() {
                     self.screen.abandon();
                 }
                 ExitStatus::HANGUP
             }
-            Some(End::Error(error)) => return Err(error),
-            Some(End::Quit(status)) => {
+            Some(LoopEnd::Error(error)) => return Err(error),
+            Some(LoopEnd::Quit(status)) => {
                 self.leave();
                 status
             }
             None => ExitStatus::QUIT,
         };
         let saving = &self.state.saving;
-        Ok(Ended {
+        Ok(TuiOutcome {
             status,
             is_write_unanswered: saving.is_write_requested,
             summary: exit_summary::words(&self.state),
@@ -168,7 +168,7 @@ impl Ui {
         let deadline = self.presenter.display.patience().map(|patience| Instant::now() + patience);
         while let Some(deadline) = deadline.filter(|_| self.presenter.display.patience().is_some()) {
             match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(Event::Answer(answer)) => self.presenter.display.answered(answer, Instant::now()),
+                Ok(Event::TerminalReply(answer)) => self.presenter.display.answered(answer, Instant::now()),
                 Ok(event) => self.postponed.push_back(event),
                 Err(_) => return,
             }
@@ -176,7 +176,7 @@ impl Ui {
     }
 
     /// Everything that has happened, or the next thing that does.
-    fn wait(&mut self) -> Option<End> {
+    fn wait(&mut self) -> Option<LoopEnd> {
         let now = Instant::now();
         let wake = self.presenter.wake(&self.state, now);
         let first = match (self.postponed.pop_front(), wake) {
@@ -187,7 +187,7 @@ impl Ui {
         let first = match first {
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => Event::Tick,
-            Err(RecvTimeoutError::Disconnected) => return Some(End::Quit(ExitStatus::HANGUP)),
+            Err(RecvTimeoutError::Disconnected) => return Some(LoopEnd::Quit(ExitStatus::HANGUP)),
         };
         let mut next = Some(first);
         while let Some(event) = next {
@@ -199,13 +199,13 @@ impl Ui {
         None
     }
 
-    fn handle(&mut self, event: Event) -> Option<End> {
+    fn handle(&mut self, event: Event) -> Option<LoopEnd> {
         match event {
             Event::Worker(protocol::Event::Preview { generation }) => {
                 let taken = self.presenter.preview(generation, &self.state, Instant::now());
                 return taken.and_then(|picture| self.apply(picture));
             }
-            Event::Answer(answer) => {
+            Event::TerminalReply(answer) => {
                 self.presenter.display.answered(answer, Instant::now());
                 return self.apply(event);
             }
@@ -222,25 +222,25 @@ impl Ui {
         None
     }
 
-    fn apply(&mut self, event: Event) -> Option<End> {
+    fn apply(&mut self, event: Event) -> Option<LoopEnd> {
         let effects = update(&mut self.state, event, Instant::now());
         self.perform(effects)
     }
 
-    fn perform(&mut self, effects: Vec<Effect>) -> Option<End> {
+    fn perform(&mut self, effects: Vec<Effect>) -> Option<LoopEnd> {
         effects.into_iter().find_map(|effect| self.perform_one(effect))
     }
 
-    fn perform_one(&mut self, effect: Effect) -> Option<End> {
+    fn perform_one(&mut self, effect: Effect) -> Option<LoopEnd> {
         match effect {
             Effect::Send(command) => (self.commands)(command),
-            Effect::Quit(status) => return Some(End::Quit(status)),
+            Effect::Quit(status) => return Some(LoopEnd::Quit(status)),
             Effect::GiveUp => {
-                return Some(End::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
+                return Some(LoopEnd::Error(TuiError::WorkerGone { reason: terminal::last_panic() }));
             }
             Effect::StopJob if !signals::has_shell() => return self.apply(Event::NoShell),
             Effect::StopJob => {
-                return signals::stop_job().err().map(failed("stop the job of")).map(End::Error);
+                return signals::stop_job().err().map(failed("stop the job of")).map(LoopEnd::Error);
             }
             Effect::Suspend if signals::has_shell() => {
                 self.leave();
@@ -264,7 +264,7 @@ impl Ui {
     }
 
     /// The terminal is the editor's until it ends.
-    fn edit(&mut self, place: &FilePlace) -> Option<End> {
+    fn edit(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave();
         input::hold(true);
         self.screen.suspend();
@@ -279,7 +279,7 @@ impl Ui {
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
     }
 
-    fn redraw(&mut self) -> Option<End> {
+    fn redraw(&mut self) -> Option<LoopEnd> {
         if let Err(error) = self.screen.resume() {
             return Some(unwritable(error));
         }
@@ -287,12 +287,12 @@ impl Ui {
         self.measure()
     }
 
-    fn measure(&mut self) -> Option<End> {
+    fn measure(&mut self) -> Option<LoopEnd> {
         self.apply(Event::Resize(terminal::window(self.cell_aspect)))
     }
 
     /// Draws what is due, and sends what the line has room for.
-    fn present(&mut self) -> Option<End> {
+    fn present(&mut self) -> Option<LoopEnd> {
         if !self.screen.is_taken() {
             self.presenter.postpone(&mut self.state, Instant::now());
             return None;
@@ -305,11 +305,11 @@ impl Ui {
 }
 
 /// A terminal that is gone is a hangup, whether its signal has come or not.
-fn unwritable(error: io::Error) -> End {
+fn unwritable(error: io::Error) -> LoopEnd {
     if terminal::is_there() {
-        End::Error(TuiError::Terminal { action: "write to", source: error })
+        LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })
     } else {
-        End::Quit(ExitStatus::HANGUP)
+        LoopEnd::Quit(ExitStatus::HANGUP)
     }
 }
 

@@ -6,9 +6,9 @@ use super::*;
 fn a_source_that_ends_is_reported_after_its_messages() {
     let (from, receiver) = mpsc::channel();
     let (sender, events) = mpsc::channel();
-    forward("test", receiver, &sender, Event::of_watcher, Source::Watcher).expect("a thread");
+    forward("test", receiver, &sender, Event::of_watcher, EventSource::Watcher).expect("a thread");
     from.send(super::super::News::Settled).expect("a receiver");
     drop(from);
     assert!(matches!(events.recv(), Ok(Event::Settled)));
-    assert!(matches!(events.recv(), Ok(Event::Lost(Source::Watcher))));
+    assert!(matches!(events.recv(), Ok(Event::Lost(EventSource::Watcher))));
 }

@@ -61,7 +61,7 @@ impl Listener {
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
         let mut signals = Signals::new(MEANT.into_iter().chain(OTHERS).chain(of_linux()).chain([MARK]))?;
-        let ear = Ear { over: Arc::clone(&over), events: events.clone() };
+        let ear = SignalThread { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
             loop {
                 signals.wait().for_each(|number| ear.hear(number));
@@ -69,7 +69,7 @@ impl Listener {
                 ROUNDS.1.notify_all();
             }
         })?;
-        let ear = Ear { over: Arc::clone(&over), events: events.clone() };
+        let ear = SignalThread { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("terminal-watch".to_owned()).spawn(move || ear.watch_terminal())?;
         Ok(Self { over })
     }
@@ -110,14 +110,14 @@ fn hear_what_came() {
 }
 
 /// The program that has the terminal, and the signal that ends this one meanwhile.
-struct Child {
+struct ForegroundChild {
     id: Option<Pid>,
     ending: Option<Number>,
 }
 
-static CHILD: Mutex<Child> = Mutex::new(Child { id: None, ending: None });
+static CHILD: Mutex<ForegroundChild> = Mutex::new(ForegroundChild { id: None, ending: None });
 
-fn child() -> MutexGuard<'static, Child> {
+fn child() -> MutexGuard<'static, ForegroundChild> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -164,12 +164,12 @@ impl Drop for KeysOfChild {
     }
 }
 
-struct Ear {
+struct SignalThread {
     over: Arc<AtomicBool>,
     events: Sender<Event>,
 }
 
-impl Ear {
+impl SignalThread {
     fn hear(&self, number: i32) {
         if number == MARK {
             return;

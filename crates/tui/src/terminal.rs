@@ -1,6 +1,6 @@
 //! The terminal: taken, given back, whatever happens.
 //!
-//! One [`Screen`] owns it. It is given back when the screen is dropped, when the front end's thread panics (by a
+//! One [`TerminalSession`] owns it. It is given back when the screen is dropped, when the front end's thread panics (by a
 //! hook that is chained once), before the program stops, and by [`rescue`] when the front end is stuck.
 
 use std::cell::Cell;
@@ -22,11 +22,11 @@ use crossterm::{execute, terminal};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, SetArg, Termios, tcflush, tcgetattr, tcsetattr};
 
-use super::chrome::{KEEP_TITLE, PROGRESS_OFF, TITLE_BACK};
 use super::event::Window;
 use super::graphics;
 use super::options::TuiError;
 use super::paint::LINK_OFF;
+use super::window_title::{KEEP_TITLE, PROGRESS_OFF, TITLE_BACK};
 use super::writer;
 use crate::system::abort;
 
@@ -77,9 +77,9 @@ const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
 const STUCK: Duration = Duration::from_millis(60);
 
 /// The terminal, taken.
-pub(super) struct Screen(());
+pub(super) struct TerminalSession(());
 
-impl Screen {
+impl TerminalSession {
     /// Takes the terminal: raw mode, alternate screen, no cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
         chain_panic_hook();
@@ -93,13 +93,13 @@ impl Screen {
         TAKEN.load(Ordering::Acquire)
     }
 
-    /// Gives the screen back and keeps the keys, until [`Screen::resume`] or the end: what the terminal still answers
+    /// Gives the screen back and keeps the keys, until [`TerminalSession::resume`] or the end: what the terminal still answers
     /// must not be echoed.
     pub(super) fn leave(&mut self) {
         leave_screen();
     }
 
-    /// Gives the terminal back until [`Screen::resume`].
+    /// Gives the terminal back until [`TerminalSession::resume`].
     pub(super) fn suspend(&mut self) {
         give_back();
     }
@@ -132,7 +132,7 @@ impl Screen {
     }
 }
 
-impl Drop for Screen {
+impl Drop for TerminalSession {
     fn drop(&mut self) {
         give_back();
     }
@@ -205,9 +205,9 @@ pub(super) fn rescue() {
 }
 
 /// Bytes and modes with which an abort gives the terminal back, without an allocation.
-static LAST_WORDS: OnceLock<LastWords> = OnceLock::new();
+static LAST_WORDS: OnceLock<RestoreData> = OnceLock::new();
 
-struct LastWords {
+struct RestoreData {
     /// The modes of the terminal before it was first taken.
     modes: Option<nix::libc::termios>,
     /// The bytes that delete images.
@@ -222,7 +222,7 @@ fn prepare_abort() {
         let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
         // Writing to memory does not fail.
         let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
-        LastWords { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
+        RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
     abort::set_terminal_restore(give_back_at_once);
 }

@@ -23,14 +23,14 @@ pub(super) enum Brand {
 
 /// A terminal and its version: `[0, 0]` if that is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Terminal {
+pub(super) struct TerminalId {
     pub(super) brand: Brand,
     pub(super) version: [u32; 2],
 }
 
 /// Protocols of notifications on the desktop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Notice {
+pub(super) enum NotificationProtocol {
     /// iTerm2's.
     Osc9,
     /// kitty's.
@@ -43,12 +43,12 @@ pub(super) enum Notice {
 
 /// Abilities of a terminal besides text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Abilities {
+pub(super) struct Capabilities {
     /// A title of the window (OSC 2).
     pub(super) title: bool,
     /// A bar of progress in the window's frame (OSC 9;4).
     pub(super) progress: bool,
-    pub(super) notice: Option<Notice>,
+    pub(super) notice: Option<NotificationProtocol>,
     /// Reports whether it has the focus (mode 1004).
     pub(super) focus: bool,
     /// Links in text (OSC 8).
@@ -71,7 +71,7 @@ impl Brand {
         PROGRAMS.iter().find(|(known, _)| *known == name).map(|(_, brand)| *brand)
     }
 
-    /// Whether a terminal that `TERM_PROGRAM` names has 24 bits of colour and repeats characters (REP).
+    /// Whether a terminal that `TERM_PROGRAM` names has 24 bits of color and repeats characters (REP).
     pub(super) fn has_colors_and_repeats(self) -> bool {
         match self {
             Self::Ghostty | Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
@@ -109,7 +109,7 @@ impl Brand {
     }
 }
 
-impl Terminal {
+impl TerminalId {
     /// A terminal as XTVERSION reports it: `foot(1.20.2)`, `ghostty 1.2.0`.
     pub(super) fn of_report(report: &str) -> Option<Self> {
         const NAMES: [(&str, Brand); 10] = [
@@ -171,45 +171,53 @@ impl Terminal {
     }
 
     /// Its abilities, by its documentation.
-    pub(super) fn abilities(self) -> Abilities {
+    pub(super) fn abilities(self) -> Capabilities {
         let Self { brand, version } = self;
-        let all = Abilities {
+        let all = Capabilities {
             title: true,
             progress: false,
-            notice: Some(Notice::Bell),
+            notice: Some(NotificationProtocol::Bell),
             focus: true,
             links: true,
             clipboard: true,
         };
         let since = |least: [u32; 2]| version >= least;
         match brand {
-            Brand::Kitty => Abilities { notice: Some(Notice::Osc99), ..all },
-            Brand::Foot | Brand::Contour => Abilities { notice: Some(Notice::Osc777), ..all },
-            Brand::Ghostty => Abilities { notice: Some(Notice::Osc777), progress: since([1, 2]), ..all },
-            // Before, it took such a sequence for a notification.
-            Brand::WezTerm => {
-                Abilities { notice: Some(Notice::Osc777), progress: since([20_250_301, 0]), ..all }
+            Brand::Kitty => Capabilities { notice: Some(NotificationProtocol::Osc99), ..all },
+            Brand::Foot | Brand::Contour => {
+                Capabilities { notice: Some(NotificationProtocol::Osc777), ..all }
             }
-            Brand::Iterm2 => Abilities { notice: Some(Notice::Osc9), progress: since([3, 7]), ..all },
-            Brand::WindowsTerminal => Abilities { progress: true, ..all },
-            Brand::VsCode => Abilities { progress: since([1, 97]), ..all },
-            Brand::Mintty => Abilities { progress: since([3, 5]), ..all },
+            Brand::Ghostty => {
+                Capabilities { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
+            }
+            // Before, it took such a sequence for a notification.
+            Brand::WezTerm => Capabilities {
+                notice: Some(NotificationProtocol::Osc777),
+                progress: since([20_250_301, 0]),
+                ..all
+            },
+            Brand::Iterm2 => {
+                Capabilities { notice: Some(NotificationProtocol::Osc9), progress: since([3, 7]), ..all }
+            }
+            Brand::WindowsTerminal => Capabilities { progress: true, ..all },
+            Brand::VsCode => Capabilities { progress: since([1, 97]), ..all },
+            Brand::Mintty => Capabilities { progress: since([3, 5]), ..all },
             Brand::Alacritty => all,
-            Brand::Konsole => Abilities { progress: since([25, 4]), clipboard: false, ..all },
+            Brand::Konsole => Capabilities { progress: since([25, 4]), clipboard: false, ..all },
             Brand::Vte => {
-                Abilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
+                Capabilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
             }
             // By default, xterm refuses text for the clipboard.
-            Brand::Xterm => Abilities { links: false, clipboard: false, ..all },
-            Brand::ConEmu => Abilities { title: true, progress: true, ..Abilities::default() },
+            Brand::Xterm => Capabilities { links: false, clipboard: false, ..all },
+            Brand::ConEmu => Capabilities { title: true, progress: true, ..Capabilities::default() },
             Brand::AppleTerminal => {
-                Abilities { links: false, clipboard: false, focus: false, notice: None, ..all }
+                Capabilities { links: false, clipboard: false, focus: false, notice: None, ..all }
             }
         }
     }
 }
 
-/// Whether a terminal of this name has text and colours alone, or keeps other sequences for itself.
+/// Whether a terminal of this name has text and colors alone, or keeps other sequences for itself.
 fn is_without_extras(term: &str) -> bool {
     term.is_empty() || ["linux", "dumb", "vt", "screen", "tmux"].iter().any(|name| term.starts_with(name))
 }
@@ -225,8 +233,8 @@ fn version(text: &str) -> [u32; 2] {
 mod tests {
     use super::*;
 
-    fn found(pairs: &[(&str, &str)]) -> Option<Terminal> {
-        Terminal::of_environment(|name| {
+    fn found(pairs: &[(&str, &str)]) -> Option<TerminalId> {
+        TerminalId::of_environment(|name| {
             pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
         })
     }
@@ -254,7 +262,7 @@ mod tests {
             // VS Code within kitty.
             (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
         ] {
-            assert_eq!(found(pairs), Some(Terminal { brand, version }), "{pairs:?}");
+            assert_eq!(found(pairs), Some(TerminalId { brand, version }), "{pairs:?}");
         }
     }
 
@@ -273,7 +281,7 @@ mod tests {
         ] {
             assert_eq!(found(pairs), None, "{pairs:?}");
         }
-        assert_eq!(Terminal::of_report("tmux 3.4"), None);
+        assert_eq!(TerminalId::of_report("tmux 3.4"), None);
     }
 
     #[test]
@@ -290,7 +298,7 @@ mod tests {
             ("kitty(0.40.1)", false),
             ("XTerm(390)", false),
         ] {
-            let terminal = Terminal::of_report(report).expect(report);
+            let terminal = TerminalId::of_report(report).expect(report);
             assert_eq!(terminal.abilities().progress, has_progress, "{report}");
         }
     }

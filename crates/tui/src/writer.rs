@@ -18,25 +18,25 @@ use nix::unistd::ttyname;
 use super::event::Event;
 
 /// Bytes that wait to be written. There is one standard output, and one queue.
-static QUEUE: Queue = Queue {
-    waiting: Mutex::new(Waiting { slices: VecDeque::new(), is_writing: false, is_given_up: false }),
+static QUEUE: WriteQueue = WriteQueue {
+    waiting: Mutex::new(PendingWrites { slices: VecDeque::new(), is_writing: false, is_given_up: false }),
     changed: Condvar::new(),
 };
 
-struct Queue {
-    waiting: Mutex<Waiting>,
+struct WriteQueue {
+    waiting: Mutex<PendingWrites>,
     changed: Condvar,
 }
 
-struct Waiting {
+struct PendingWrites {
     slices: VecDeque<Vec<u8>>,
     is_writing: bool,
     /// Whether what the terminal does not take at once is dropped.
     is_given_up: bool,
 }
 
-impl Queue {
-    fn lock(&self) -> MutexGuard<'_, Waiting> {
+impl WriteQueue {
+    fn lock(&self) -> MutexGuard<'_, PendingWrites> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -109,7 +109,7 @@ pub(super) fn discard(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
     let wait = |waiting, patience| {
-        let is_writing = |waiting: &mut Waiting| waiting.is_writing;
+        let is_writing = |waiting: &mut PendingWrites| waiting.is_writing;
         let ended = QUEUE.changed.wait_timeout_while(waiting, patience, is_writing);
         ended.unwrap_or_else(PoisonError::into_inner).0
     };

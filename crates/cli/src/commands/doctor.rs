@@ -8,7 +8,7 @@ use crate::bench::cache;
 use crate::commands::check::count;
 use crate::console::Console;
 use crate::exit::Exit;
-use crate::tui::{self, Answers, ColorDepth, Probe, probe};
+use crate::tui::{self, ColorDepth, Probe, ProbeReplies, probe};
 
 /// Prints a line for each finding.
 pub(crate) fn run(console: &Console) -> Exit {
@@ -102,7 +102,7 @@ fn preview(probe: &Probe) -> String {
     format!("{}; {more}", probe.preview())
 }
 
-fn round_trip(answers: Option<&Answers>) -> String {
+fn round_trip(answers: Option<&ProbeReplies>) -> String {
     let Some(answers) = answers else { return "the terminal does not answer".to_owned() };
     let whole = if answers.is_synchronized { "; frames appear at once" } else { "" };
     format!("{:.1} ms{whole}", answers.round_trip.as_secs_f64() * 1e3)

@@ -22,7 +22,7 @@ use crate::progress::{json_line, style};
 use crate::scene::sanitize::{shortened, visible};
 use crate::signals::{self, Ended};
 use crate::system::threads::start_failure;
-use crate::tui::{Named, printed};
+use crate::tui::{NamedImage, images_as_text};
 
 /// Between two looks for parts that arrive.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -249,7 +249,7 @@ impl Merge<'_> {
                 self.pool.install(|| {
                     let image = finish.image(&merged.film);
                     let picture = develop(&image, &finish.tone.resolved_for(&image));
-                    printed(&[Named { name: words.to_string(), picture }], self.args.color, true)
+                    images_as_text(&[NamedImage { name: words.to_string(), picture }], self.args.color, true)
                 })
             }
         };

@@ -1,34 +1,34 @@
-//! Colours that a terminal does not have, mixed by the eye from those that it has.
+//! Colors that a terminal does not have, mixed by the eye from those that it has.
 //!
-//! For each colour a recipe of [`PARTS`] inks is found whose mean in linear light is the colour, and whose inks are as
+//! For each color a recipe of [`PARTS`] inks is found whose mean in linear light is the color, and whose inks are as
 //! near to it, and so to each other, as that allows: the remaining error is fed back from one ink to the next (after
-//! J. Yliluoma and T. Knoll, "pattern dithering"), in Oklab linearised at the colour. The parts are sorted by lightness,
-//! and a threshold picks one of them: the same at the same place, whatever its neighbours are.
+//! J. Yliluoma and T. Knoll, "pattern dithering"), in Oklab linearised at the color. The parts are sorted by lightness,
+//! and a threshold picks one of them: the same at the same place, whatever its neighbors are.
 
 use std::collections::HashMap;
 
-use super::oklab::{Slope, oklab};
+use super::oklab::{OklabDerivative, oklab};
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
 
 /// Inks in a recipe.
 pub(super) const PARTS: usize = 16;
-/// Inks that are looked at for a recipe: those nearest to the colour.
+/// Inks that are looked at for a recipe: those nearest to the color.
 const NEAREST: usize = 32;
 /// Most recipes that are kept.
 const MOST_RECIPES: usize = 1 << 16;
 
-/// An ink: a colour or a pattern to mix from.
+/// An ink: a color or a pattern to mix from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ink {
     linear: Vec3,
     lab: Vec3,
-    /// Its distance from a single colour, squared.
+    /// Its distance from a single color, squared.
     texture: f32,
 }
 
 impl Ink {
-    /// One colour.
+    /// One color.
     pub(super) fn plain(rgb: [u8; 3]) -> Self {
         let linear = srgb8_to_linear(rgb);
         Self { linear, lab: oklab(linear), texture: 0.0 }
@@ -61,7 +61,7 @@ impl Mixer {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
-    /// The index of the ink for a colour where the threshold, in (0, 1), is this.
+    /// The index of the ink for a color where the threshold, in (0, 1), is this.
     pub(super) fn ink(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {
@@ -83,7 +83,7 @@ impl Mixer {
     fn recipe(&self, rgb: [u8; 3]) -> [u16; PARTS] {
         let linear = srgb8_to_linear(rgb);
         let lab = oklab(linear);
-        let slope = Slope::at(linear);
+        let slope = OklabDerivative::at(linear);
         let mut near: Vec<(f32, usize)> = self
             .inks
             .iter()
@@ -126,7 +126,7 @@ mod tests {
     fn an_ink_stays_as_it_is() {
         let mut mixer = cube();
         for index in [0, 5, 100, 215, 230] {
-            let rgb = palette::fixed(16 + index).expect("a fixed colour");
+            let rgb = palette::fixed(16 + index).expect("a fixed color");
             for part in 0..PARTS {
                 let ink = mixer.ink(rgb, (part as f32 + 0.5) / PARTS as f32);
                 assert_eq!(palette::fixed(16 + ink as u8), Some(rgb));
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_a_recipe_is_the_colour() {
+    fn the_mean_of_a_recipe_is_the_color() {
         let mut mixer = cube();
         for rgb in [[150, 75, 50], [101, 67, 33], [30, 60, 90], [200, 190, 180], [115, 115, 110]] {
             let parts: Vec<usize> =

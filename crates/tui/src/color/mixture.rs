@@ -1,9 +1,9 @@
-//! Colours mixed from those of any palette.
+//! Colors mixed from those of any palette.
 
 use super::mix::{Ink, Mixer};
 use super::pattern::threshold;
 
-/// Weight of calm among colours that were chosen for the picture.
+/// Weight of calm among colors that were chosen for the picture.
 const CALM: f32 = 1.0;
 
 /// The inks that a picture is mixed from.
@@ -11,12 +11,12 @@ const CALM: f32 = 1.0;
 pub(crate) struct Mixture(Mixer);
 
 impl Mixture {
-    /// From these colours.
+    /// From these colors.
     pub(crate) fn new(colors: &[[u8; 3]]) -> Self {
         Self(Mixer::new(colors.iter().copied().map(Ink::plain).collect(), CALM))
     }
 
-    /// The number of the colour that stands for another one at this place.
+    /// The number of the color that stands for another one at this place.
     pub(crate) fn index(&mut self, rgb: [u8; 3], x: usize, y: usize) -> usize {
         self.0.ink(rgb, threshold(x, y))
     }

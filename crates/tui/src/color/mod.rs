@@ -1,4 +1,4 @@
-//! Colours of the terminal, and how they show other colours.
+//! Colors of the terminal, and how they show other colors.
 
 mod mix;
 mod mixture;
@@ -19,13 +19,13 @@ use super::terminals::Brand;
 use crate::choice;
 
 choice! {
-    /// Choice of colours.
+    /// Choice of colors.
     pub enum ColorChoice {
         /// What the terminal can show.
         Auto = "auto",
         /// 24 bits.
         TrueColor = "truecolor",
-        /// The palette of 256: the 6×6×6 cube and the greys of xterm.
+        /// The palette of 256: the 6×6×6 cube and the grays of xterm.
         Indexed256 = "256",
         /// The palette of 16 of xterm.
         Ansi16 = "16",
@@ -34,14 +34,14 @@ choice! {
     }
 }
 
-/// Colours that the terminal gets.
+/// Colors that the terminal gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorDepth {
     /// 24 bits.
     TrueColor,
-    /// The 6×6×6 cube and the greys of xterm.
+    /// The 6×6×6 cube and the grays of xterm.
     Indexed256,
-    /// The 16 colours of xterm.
+    /// The 16 colors of xterm.
     Ansi16,
     /// None at all.
     None,
@@ -98,7 +98,7 @@ pub(super) fn has_light_background(variable: impl Fn(&str) -> Option<String>) ->
     last.is_some_and(|index| index == 7 || (9..16).contains(&index))
 }
 
-/// The names of the 16 colours.
+/// The names of the 16 colors.
 const NAMES: [Color; 16] = [
     Color::Black,
     Color::Red,

@@ -20,18 +20,18 @@ fn product(rows: [Vec3; 3], v: Vec3) -> Vec3 {
     Vec3::from_array(rows.map(|row| row.dot(v)))
 }
 
-/// Oklab of a linear colour.
+/// Oklab of a linear color.
 pub(crate) fn oklab(linear: Vec3) -> Vec3 {
     let cones = product(CONES, linear.max(Vec3::ZERO));
     product(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
 
-/// Derivative of Oklab by linear light, around a colour. In the dark the derivative has no bound, and a smaller one is assumed.
+/// Derivative of Oklab by linear light, around a color. In the dark the derivative has no bound, and a smaller one is assumed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slope(Vec3);
+pub(super) struct OklabDerivative(Vec3);
 
-impl Slope {
-    /// Around this linear colour.
+impl OklabDerivative {
+    /// Around this linear color.
     pub(super) fn at(linear: Vec3) -> Self {
         const DARK: f32 = 0.01;
         let cones = product(CONES, linear.max(Vec3::ZERO));
@@ -63,6 +63,6 @@ mod tests {
         let color = Vec3::new(0.4, 0.2, 0.6);
         let step = Vec3::new(1e-3, -2e-3, 1e-3);
         let change = oklab(color + step) - oklab(color);
-        assert!(Slope::at(color).change(step).distance(change) < 0.1 * change.length());
+        assert!(OklabDerivative::at(color).change(step).distance(change) < 0.1 * change.length());
     }
 }

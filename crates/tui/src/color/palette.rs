@@ -1,19 +1,19 @@
-//! The colours of the palettes: 16 of the terminal's own, and xterm's cube and greys.
+//! The colors of the palettes: 16 of the terminal's own, and xterm's cube and grays.
 
 use ratatui::style::Color;
 
 /// The levels of a channel in the 6×6×6 cube.
 pub(crate) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 
-/// First of the colours that are the same everywhere: a cube.
+/// First of the colors that are the same everywhere: a cube.
 pub(crate) const FIRST_FIXED: u8 = 16;
-/// First grey.
+/// First gray.
 pub(crate) const FIRST_GREY: u8 = 232;
 
-/// The 16 colours of a terminal, in sRGB.
+/// The 16 colors of a terminal, in sRGB.
 pub(crate) type Ansi = [[u8; 3]; 16];
 
-/// The 16 colours as xterm draws them by default; people change them.
+/// The 16 colors as xterm draws them by default; people change them.
 pub(crate) const XTERM: Ansi = [
     [0, 0, 0],
     [205, 0, 0],
@@ -33,7 +33,7 @@ pub(crate) const XTERM: Ansi = [
     [255, 255, 255],
 ];
 
-/// The 16 colours of the Linux console, which are those of the VGA.
+/// The 16 colors of the Linux console, which are those of the VGA.
 const VGA: Ansi = [
     [0, 0, 0],
     [170, 0, 0],
@@ -53,12 +53,12 @@ const VGA: Ansi = [
     [255, 255, 255],
 ];
 
-/// The likely 16 colours of a terminal that has not reported its own.
+/// The likely 16 colors of a terminal that has not reported its own.
 pub(crate) fn ansi(term: &str) -> &'static Ansi {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }
 
-/// sRGB values of a palette colour. `None` for the first 16, which are the user's.
+/// sRGB values of a palette color. `None` for the first 16, which are the user's.
 pub(crate) fn fixed(index: u8) -> Option<[u8; 3]> {
     match index {
         0..FIRST_FIXED => None,
@@ -70,7 +70,7 @@ pub(crate) fn fixed(index: u8) -> Option<[u8; 3]> {
     }
 }
 
-/// sRGB values of a colour in xterm by default. `None` for the terminal's own colour.
+/// sRGB values of a color in xterm by default. `None` for the terminal's own color.
 pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
     let ansi = match color {
         Color::Reset => return None,
@@ -96,16 +96,16 @@ pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
     Some(XTERM[ansi])
 }
 
-/// The nearer of the nearest colour of the cube (16 to 231) and the nearest grey (232 to 255).
+/// The nearer of the nearest color of the cube (16 to 231) and the nearest gray (232 to 255).
 pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
     let steps = rgb.map(nearest_level);
     let cube = steps.map(|step| CUBE_LEVELS[step]);
     let mean = rgb.iter().map(|&channel| u32::from(channel)).sum::<u32>() / 3;
-    let grey_step = (mean.saturating_sub(8) + 5).min(235) / 10;
-    let grey_step = u8::try_from(grey_step.min(23)).unwrap_or(23);
-    let grey = [8 + 10 * grey_step; 3];
-    if difference(rgb, grey) < difference(rgb, cube) {
-        FIRST_GREY + grey_step
+    let gray_step = (mean.saturating_sub(8) + 5).min(235) / 10;
+    let gray_step = u8::try_from(gray_step.min(23)).unwrap_or(23);
+    let gray = [8 + 10 * gray_step; 3];
+    if difference(rgb, gray) < difference(rgb, cube) {
+        FIRST_GREY + gray_step
     } else {
         let index = 36 * steps[0] + 6 * steps[1] + steps[2];
         FIRST_FIXED + u8::try_from(index).unwrap_or(215)
@@ -159,8 +159,8 @@ mod tests {
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {
             let rgb = [0, 8, 16].map(|shift| (i.wrapping_mul(2_654_435_761) >> shift) as u8);
-            let got = difference(rgb, fixed(nearest_256(rgb)).expect("a fixed colour"));
-            let best = palette.iter().map(|&other| difference(rgb, other)).min().expect("240 colours");
+            let got = difference(rgb, fixed(nearest_256(rgb)).expect("a fixed color"));
+            let best = palette.iter().map(|&other| difference(rgb, other)).min().expect("240 colors");
             assert!(f64::from(got).sqrt() <= f64::from(best).sqrt() + 12.0, "{rgb:?}: {got} {best}");
         }
     }

@@ -1,4 +1,4 @@
-//! The order in which the places of a picture turn from one colour to the next.
+//! The order in which the places of a picture turn from one color to the next.
 
 /// Columns and rows after which the pattern repeats.
 const SIDE: usize = 8;
@@ -15,7 +15,7 @@ pub(super) fn threshold(x: usize, y: usize) -> f32 {
     (rank as f32 + 0.5) / (SIDE * SIDE) as f32
 }
 
-/// A colour in six bits of a channel, dithered.
+/// A color in six bits of a channel, dithered.
 pub(crate) fn finer(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
     const LEVELS: u16 = 63;
     let more = (threshold(x, y) * 255.0) as u16;
@@ -42,7 +42,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_finer_colours_is_the_colour() {
+    fn the_mean_of_finer_colors_is_the_color() {
         assert_eq!((finer([0; 3], 3, 4), finer([255; 3], 3, 4)), ([0; 3], [255; 3]));
         let sum: u32 = (0..64).map(|i| u32::from(finer([101; 3], i % 8, i / 8)[0])).sum();
         assert!(sum.abs_diff(101 * 64) <= 64, "{sum}");

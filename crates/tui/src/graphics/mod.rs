@@ -7,8 +7,8 @@ pub(super) mod base64;
 mod iterm;
 mod kitty;
 mod palette;
+mod pixel_screen;
 mod png;
-mod seen;
 mod sixel;
 
 use std::collections::VecDeque;
@@ -20,7 +20,7 @@ use self::palette::Palette;
 use crate::film::Picture;
 
 pub(super) use self::kitty::delete_all;
-pub use self::seen::PixelScreen;
+pub use self::pixel_screen::PixelScreen;
 
 /// Protocols for pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,14 +35,14 @@ pub(super) enum Protocol {
 
 /// A picture in its place.
 #[derive(Clone, Debug)]
-pub(super) struct Placement {
+pub(super) struct PixelPlacement {
     pub(super) picture: Arc<Picture>,
     pub(super) cells: Rect,
     /// Width and height of a cell in pixels.
     pub(super) cell: (u16, u16),
 }
 
-impl PartialEq for Placement {
+impl PartialEq for PixelPlacement {
     fn eq(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.picture, &other.picture) && (self.cells, self.cell) == (other.cells, other.cell)
     }
@@ -62,9 +62,9 @@ pub(super) struct Images {
     protocol: Protocol,
     /// Inside tmux, which passes on what is wrapped.
     is_wrapped: bool,
-    wanted: Option<Placement>,
+    wanted: Option<PixelPlacement>,
     /// The picture on the screen once all pieces have arrived.
-    shown: Option<Placement>,
+    shown: Option<PixelPlacement>,
     is_still: bool,
     /// Whether what is shown was made coarser than the picture, to be shorter.
     is_coarse: bool,
@@ -95,7 +95,7 @@ impl Images {
 
     /// Show this from now on; `is_still`: no other one will follow soon. What is returned is to be drawn again, since a picture no
     /// longer lies over it.
-    pub(super) fn aim(&mut self, wanted: Option<Placement>, is_still: bool) -> Option<Rect> {
+    pub(super) fn aim(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
         if self.wanted.as_ref().is_some_and(|wanted| wanted.cells == shown) {

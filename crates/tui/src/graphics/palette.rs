@@ -1,23 +1,23 @@
-//! A palette made from a picture: boxes of colours are split where their squared error is largest (after X. Wu, "Efficient
+//! A palette made from a picture: boxes of colors are split where their squared error is largest (after X. Wu, "Efficient
 //! statistical computations for optimal color quantization", 1991), and each becomes its mean.
 //!
-//! Pictures of one render follow each other closely: the palette stays as long as it fits, or its colours would flicker.
-//! Colours between those of the palette are mixed by place, as those of other palettes are.
+//! Pictures of one render follow each other closely: the palette stays as long as it fits, or its colors would flicker.
+//! Colors between those of the palette are mixed by place, as those of other palettes are.
 
 use std::ops::Range;
 
 use crate::color::{Mixture, finer};
 use crate::film::Picture;
 
-/// The most colours: registers below 16 are the terminal's own.
+/// The most colors: registers below 16 are the terminal's own.
 const MOST: usize = 240;
-/// Bits of a channel that tell colours apart when the palette is made.
+/// Bits of a channel that tell colors apart when the palette is made.
 const BITS: u32 = 6;
 /// A palette stays while the root of its squared error is no larger than this many times that of a new one, and so many codes.
 const WORSE: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 
-/// The colours that a picture is shown in.
+/// The colors that a picture is shown in.
 #[derive(Debug)]
 pub(super) struct Palette {
     colors: Vec<[u8; 3]>,
@@ -37,7 +37,7 @@ impl Palette {
         &self.colors
     }
 
-    /// The number of the colour for each pixel.
+    /// The number of the color for each pixel.
     pub(super) fn indices(&mut self, picture: &Picture) -> Vec<u8> {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
@@ -48,7 +48,7 @@ impl Palette {
     }
 }
 
-/// Pixels of about one colour.
+/// Pixels of about one color.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bin {
     sum: [f32; 3],
@@ -61,7 +61,7 @@ impl Bin {
     }
 }
 
-/// The colours of a picture and how often each is there.
+/// The colors of a picture and how often each is there.
 fn bins(picture: &Picture) -> Vec<Bin> {
     let mut bins = vec![Bin::default(); 1 << (3 * BITS)];
     for rgb in &picture.pixels {
@@ -76,7 +76,7 @@ fn bins(picture: &Picture) -> Vec<Bin> {
     bins
 }
 
-/// Some bins that become one colour.
+/// Some bins that become one color.
 struct ColorBox {
     bins: Range<usize>,
     mean: [f64; 3],
@@ -120,7 +120,7 @@ fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     boxes.iter().map(|own| own.mean.map(|channel| channel.round() as u8)).collect()
 }
 
-/// The root of the mean squared distance, in codes, of the colours of a picture to the nearest of a palette.
+/// The root of the mean squared distance, in codes, of the colors of a picture to the nearest of a palette.
 fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
     let nearest = |mean: [f64; 3]| {
         let distance = |color: &[u8; 3]| -> f64 {
@@ -136,7 +136,7 @@ fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A ramp of one colour from dark to light, and a spot of another one.
+    /// A ramp of one color from dark to light, and a spot of another one.
     fn ramp(most: f64) -> Picture {
         let pixel = |i: u32| {
             let light = f64::from(i % 128) / 127.0 * most;
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn few_colours_are_shown_exactly_and_rare_ones_are_not_lost() {
+    fn few_colors_are_shown_exactly_and_rare_ones_are_not_lost() {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
         let picture = Picture { width: 64, height: 64, pixels };

@@ -1,4 +1,4 @@
-//! Sixels (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one colour after the other.
+//! Sixels (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one color after the other.
 
 use ratatui::layout::Rect;
 
@@ -6,13 +6,13 @@ use super::palette::Palette;
 use crate::film::Picture;
 use crate::rescale::resized;
 
-/// The register of the first colour: those below are the terminal's own.
+/// The register of the first color: those below are the terminal's own.
 const FIRST: u8 = 16;
 /// Registers.
 const REGISTERS: usize = 256;
 
-/// The commands that show a picture at the cursor over these cells of so many pixels. The colours are those of a palette made
-/// from it, or from one before that it resembles. A picture that has fewer pixels is drawn by larger ones: colours are chosen, and
+/// The commands that show a picture at the cursor over these cells of so many pixels. The colors are those of a palette made
+/// from it, or from one before that it resembles. A picture that has fewer pixels is drawn by larger ones: colors are chosen, and
 /// memory is taken, for those that it has.
 pub(super) fn encode(
     picture: &Picture,
@@ -51,7 +51,7 @@ pub(super) fn encode(
     bytes
 }
 
-/// Six rows: for each colour its sixels.
+/// Six rows: for each color its sixels.
 struct Band {
     width: usize,
     /// Sixels of all registers, one register after the other.
@@ -72,7 +72,7 @@ impl Band {
         }
     }
 
-    /// Appends the sixels of each colour in these rows, back to the left after each, and at last down; the next rows are empty.
+    /// Appends the sixels of each color in these rows, back to the left after each, and at last down; the next rows are empty.
     fn push(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());

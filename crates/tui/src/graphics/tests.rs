@@ -5,10 +5,10 @@ fn noise(level: u8, i: u32) -> [u8; 3] {
     [level, (hash >> 13) as u8, (hash >> 22) as u8]
 }
 
-fn placement(level: u8, x: u16) -> Placement {
+fn placement(level: u8, x: u16) -> PixelPlacement {
     let pixels = (0..64 * 48).map(|i| noise(level, i)).collect();
     let picture = Arc::new(Picture { width: 64, height: 48, pixels });
-    Placement { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
+    PixelPlacement { picture, cells: Rect::new(x, 1, 8, 3), cell: (8, 16) }
 }
 
 fn all(images: &mut Images) -> String {
@@ -94,7 +94,7 @@ fn tmux_passes_on_what_is_wrapped() {
 }
 
 #[test]
-fn sixels_have_the_size_of_their_cells_and_their_colours() {
+fn sixels_have_the_size_of_their_cells_and_their_colors() {
     let mut placed = placement(0, 0);
     let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
     placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });

@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use crossterm::event::KeyCode;
 
-use super::keys::Meaning;
+use super::decoded::DecodedInput;
+use super::keys::KeyParser;
 use super::paste::Paste;
-use super::sent::Input;
 use crate::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
@@ -32,8 +32,8 @@ const LONGEST_ANSWER: usize = 32;
 #[derive(Default)]
 pub(crate) struct Decoder {
     parser: vte::Parser,
-    meaning: Meaning,
-    held: Held,
+    meaning: KeyParser,
+    held: PendingSequence,
     /// When the last byte came.
     last: Option<Instant>,
     /// When silence made a key of an escape character.
@@ -44,7 +44,7 @@ pub(crate) struct Decoder {
 
 /// A sequence that has begun and not ended.
 #[derive(Debug, Default)]
-enum Held {
+enum PendingSequence {
     #[default]
     Nothing,
     /// An escape character alone.
@@ -64,10 +64,10 @@ enum Held {
 
 impl Decoder {
     /// Decodes these bytes, together with those before.
-    pub(crate) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<Input> {
+    pub(crate) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<DecodedInput> {
         // An escape character and a doubt are not over: what had to follow them is here, if late. Nor is a paste: its text
         // may have waited for a busy reader, which is no silence.
-        if matches!(self.held, Held::Sequence { .. }) {
+        if matches!(self.held, PendingSequence::Sequence { .. }) {
             self.expire_into_found(now);
         }
         self.last = Some(now);
@@ -81,17 +81,17 @@ impl Decoder {
     pub(super) fn deadline(&self) -> Option<Instant> {
         let after = |wait| self.last.map(|last| last + wait);
         match &self.held {
-            Held::Nothing => None,
-            Held::Escape => after(LONE_ESCAPE),
-            Held::StringEnd => after(SEQUENCE),
-            Held::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
-            Held::Doubtful(_) => after(DOUBT),
-            Held::Paste(paste) => Some(paste.deadline()),
+            PendingSequence::Nothing => None,
+            PendingSequence::Escape => after(LONE_ESCAPE),
+            PendingSequence::StringEnd => after(SEQUENCE),
+            PendingSequence::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
+            PendingSequence::Doubtful(_) => after(DOUBT),
+            PendingSequence::Paste(paste) => Some(paste.deadline()),
         }
     }
 
     /// Decodes silence.
-    pub(super) fn expire(&mut self, now: Instant) -> Vec<Input> {
+    pub(super) fn expire(&mut self, now: Instant) -> Vec<DecodedInput> {
         self.expire_into_found(now);
         std::mem::take(&mut self.meaning.found)
     }
@@ -99,53 +99,53 @@ impl Decoder {
     fn expire_into_found(&mut self, now: Instant) {
         if self.deadline().is_some_and(|deadline| now >= deadline) {
             match self.give_up() {
-                Held::Escape => {
+                PendingSequence::Escape => {
                     self.escaped = Some(now);
                     self.press_escape();
                 }
-                Held::Doubtful(bytes) => self.replay(&bytes),
-                Held::Paste(_) => self.meaning.found.push(Input::Paste),
+                PendingSequence::Doubtful(bytes) => self.replay(&bytes),
+                PendingSequence::Paste(_) => self.meaning.found.push(DecodedInput::Paste),
                 // Nothing followed: two keys.
-                Held::Sequence { bytes: 2, introducer, .. } => {
+                PendingSequence::Sequence { bytes: 2, introducer, .. } => {
                     self.press_escape();
                     self.replay(&[introducer]);
                 }
-                Held::Nothing | Held::StringEnd | Held::Sequence { .. } => {}
+                PendingSequence::Nothing | PendingSequence::StringEnd | PendingSequence::Sequence { .. } => {}
             }
         }
     }
 
     fn take(&mut self, byte: u8, now: Instant) {
         match std::mem::take(&mut self.held) {
-            Held::Nothing => self.begin(byte, now),
-            Held::Escape | Held::StringEnd => self.follow_escape(byte, now),
-            Held::Sequence { introducer, .. } if byte == ESCAPE => {
+            PendingSequence::Nothing => self.begin(byte, now),
+            PendingSequence::Escape | PendingSequence::StringEnd => self.follow_escape(byte, now),
+            PendingSequence::Sequence { introducer, .. } if byte == ESCAPE => {
                 if introducer == b'_' {
                     self.meaning.end_command(&std::mem::take(&mut self.command));
                 }
                 self.begin(byte, now);
                 if b"]P_X^".contains(&introducer) {
-                    self.held = Held::StringEnd;
+                    self.held = PendingSequence::StringEnd;
                 }
             }
-            Held::Sequence { bytes: 2, introducer, .. } if is_key_behind(introducer, byte) => {
+            PendingSequence::Sequence { bytes: 2, introducer, .. } if is_key_behind(introducer, byte) => {
                 self.give_up();
                 self.press_escape();
                 self.replay(&[introducer]);
                 self.begin(byte, now);
             }
-            Held::Sequence { begin, bytes, introducer } => {
+            PendingSequence::Sequence { begin, bytes, introducer } => {
                 if introducer == b'_' {
                     self.command.push(byte);
                 }
                 self.go_on(byte, (begin, bytes + 1, introducer), now);
             }
-            Held::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
-            Held::Paste(mut paste) => {
+            PendingSequence::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
+            PendingSequence::Paste(mut paste) => {
                 if paste.takes_last(byte, now) {
-                    self.meaning.found.push(Input::Paste);
+                    self.meaning.found.push(DecodedInput::Paste);
                 } else {
-                    self.held = Held::Paste(paste);
+                    self.held = PendingSequence::Paste(paste);
                 }
             }
         }
@@ -157,11 +157,11 @@ impl Decoder {
             ESCAPE => {
                 self.meaning.forget();
                 self.parser.advance(&mut self.meaning, &[byte]);
-                self.held = Held::Escape;
+                self.held = PendingSequence::Escape;
             }
             b'[' if escaped.is_some() => {
                 self.parser.advance(&mut self.meaning, &[ESCAPE, byte]);
-                self.held = Held::Doubtful(vec![byte]);
+                self.held = PendingSequence::Doubtful(vec![byte]);
             }
             _ => self.parser.advance(&mut self.meaning, &[byte]),
         }
@@ -171,7 +171,7 @@ impl Decoder {
         match byte {
             ESCAPE => {
                 self.press_escape();
-                self.held = Held::Escape;
+                self.held = PendingSequence::Escape;
             }
             // No terminal sends a sequence that goes on like this.
             byte if !INTRODUCERS.contains(&byte) => {
@@ -188,11 +188,11 @@ impl Decoder {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
         if std::mem::take(&mut self.meaning.is_paste) {
-            self.held = Held::Paste(Paste::new(now));
+            self.held = PendingSequence::Paste(Paste::new(now));
         } else if bytes >= MOST_BYTES {
             self.give_up();
         } else if !self.meaning.has_ended {
-            self.held = Held::Sequence { begin, bytes, introducer };
+            self.held = PendingSequence::Sequence { begin, bytes, introducer };
         }
     }
 
@@ -201,14 +201,14 @@ impl Decoder {
         if (0x20..0x7f).contains(&byte) {
             self.go_on(byte, (now, bytes.len(), b'['), now);
         }
-        let is_known = self.meaning.found.len() > before || matches!(self.held, Held::Paste(_));
+        let is_known = self.meaning.found.len() > before || matches!(self.held, PendingSequence::Paste(_));
         if is_known {
             return;
         }
         let is_middle = matches!(byte, b' '..=b'?') && bytes.len() < LONGEST_ANSWER;
         if is_middle {
             bytes.push(byte);
-            self.held = Held::Doubtful(bytes);
+            self.held = PendingSequence::Doubtful(bytes);
         } else {
             self.give_up();
             self.replay(&bytes);
@@ -217,7 +217,7 @@ impl Decoder {
     }
 
     /// Forgets what began.
-    fn give_up(&mut self) -> Held {
+    fn give_up(&mut self) -> PendingSequence {
         self.meaning.forget();
         self.command.clear();
         self.parser = vte::Parser::default();
@@ -229,7 +229,7 @@ impl Decoder {
     }
 
     fn press_escape(&mut self) {
-        self.meaning.found.push(Input::Key(KeyPress::special(KeyCode::Esc)));
+        self.meaning.found.push(DecodedInput::Key(KeyPress::special(KeyCode::Esc)));
     }
 }
 

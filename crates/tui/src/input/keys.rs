@@ -3,28 +3,28 @@
 use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
 
-use super::reports::{self, Report};
-use super::sent::Input;
+use super::control_strings::{self, ControlString};
+use super::decoded::DecodedInput;
 use crate::event::{KeyPress, Mouse, MouseKind};
 use crate::graphics::Protocol;
-use crate::known::Answer;
+use crate::terminal_replies::TerminalReply;
 
 /// The parser's callbacks; holds the meaning of what was read last.
 #[derive(Debug, Default)]
-pub(super) struct Meaning {
+pub(super) struct KeyParser {
     /// Decoded input, in order.
-    pub found: Vec<Input>,
+    pub found: Vec<DecodedInput>,
     /// Whether a sequence has ended, known or not.
     pub has_ended: bool,
     /// Whether text began to be pasted.
     pub is_paste: bool,
-    next: Next,
-    report: Report,
+    next: NextCharacter,
+    report: ControlString,
 }
 
 /// Kind of the next character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Next {
+enum NextCharacter {
     #[default]
     Character,
     /// The end of a key that began with SS3 (`ESC O`): arrows of some terminals, F1 to F4.
@@ -35,20 +35,20 @@ enum Next {
     Mouse(u8),
 }
 
-impl Meaning {
+impl KeyParser {
     /// Drops the sequence that has begun.
     pub(super) fn forget(&mut self) {
-        self.next = Next::Character;
+        self.next = NextCharacter::Character;
         self.is_paste = false;
     }
 
     fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
-        self.found.push(Input::Key(KeyPress { code, modifiers }));
+        self.found.push(DecodedInput::Key(KeyPress { code, modifiers }));
     }
 
     /// An application program command has ended.
     pub(super) fn end_command(&mut self, text: &[u8]) {
-        self.answer(reports::application(text));
+        self.answer(control_strings::application(text));
     }
 
     /// A report in SGR form (mode 1006): the button with bits for what else is, and the cell from 1.
@@ -61,42 +61,42 @@ impl Meaning {
             (64, true) => MouseKind::WheelUp,
             (65, true) => MouseKind::WheelDown,
             // Other buttons.
-            _ => return self.answer(Answer::Other),
+            _ => return self.answer(TerminalReply::Other),
         };
         let (column, row) = (column.saturating_sub(1), row.saturating_sub(1));
-        self.found.push(Input::Mouse(Mouse { kind, column, row }));
+        self.found.push(DecodedInput::Mouse(Mouse { kind, column, row }));
     }
 
-    fn answer(&mut self, answer: Answer) {
-        self.found.push(Input::Answer(answer));
+    fn answer(&mut self, answer: TerminalReply) {
+        self.found.push(DecodedInput::TerminalReply(answer));
     }
 }
 
-impl Perform for Meaning {
+impl Perform for KeyParser {
     fn print(&mut self, character: char) {
         self.has_ended = true;
         match std::mem::take(&mut self.next) {
-            Next::Character => {
+            NextCharacter::Character => {
                 let key = match character {
                     '\x7f' => KeyCode::Backspace,
                     character => KeyCode::Char(character),
                 };
                 self.key(key, KeyModifiers::NONE);
             }
-            Next::SingleShift => {
+            NextCharacter::SingleShift => {
                 if let Some(code) = letter_key(character) {
                     self.key(code, KeyModifiers::NONE);
                 }
             }
-            Next::Console => {
+            NextCharacter::Console => {
                 if let Some(number @ 1..=5) = u8::try_from(character).ok().and_then(|it| it.checked_sub(b'@'))
                 {
                     self.key(KeyCode::F(number), KeyModifiers::NONE);
                 }
             }
-            Next::Mouse(left) => {
+            NextCharacter::Mouse(left) => {
                 if left > 1 {
-                    self.next = Next::Mouse(left - 1);
+                    self.next = NextCharacter::Mouse(left - 1);
                     self.has_ended = false;
                 }
             }
@@ -104,7 +104,7 @@ impl Perform for Meaning {
     }
 
     fn execute(&mut self, byte: u8) {
-        self.next = Next::Character;
+        self.next = NextCharacter::Character;
         match byte {
             b'\r' => self.key(KeyCode::Enter, KeyModifiers::NONE),
             b'\t' => self.key(KeyCode::Tab, KeyModifiers::NONE),
@@ -118,7 +118,7 @@ impl Perform for Meaning {
     fn esc_dispatch(&mut self, intermediates: &[u8], _ignore: bool, byte: u8) {
         match byte {
             b'O' if intermediates.is_empty() => {
-                self.next = Next::SingleShift;
+                self.next = NextCharacter::SingleShift;
                 return;
             }
             // The end of a string, or an unknown one.
@@ -132,17 +132,17 @@ impl Perform for Meaning {
         let (first, second) = (number(0), number(1));
         self.has_ended = true;
         match (intermediates, action) {
-            ([], 'n') if first == 0 => self.answer(Answer::Ready),
+            ([], 'n') if first == 0 => self.answer(TerminalReply::Ready),
             (b"<", 'M' | 'm') => self.mouse(first, (second, number(2)), action == 'M'),
             (b"?", 'c') => {
                 if params.iter().any(|param| param == [4]) {
-                    self.answer(Answer::Images(Protocol::Sixel));
+                    self.answer(TerminalReply::Images(Protocol::Sixel));
                 }
-                self.answer(Answer::Attributes);
+                self.answer(TerminalReply::Attributes);
             }
             (b"?$", 'y') if first == 2026 => {
                 // 1: set, 2: reset; others: not known, or it cannot be changed.
-                self.answer(Answer::Synchronized { is_known: matches!(second, 1 | 2) });
+                self.answer(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
             }
             ([], '~') if first == 200 => self.is_paste = true,
             // A paste that was over before its end came.
@@ -154,35 +154,35 @@ impl Perform for Meaning {
             }
             ([], 'Z') => self.key(KeyCode::BackTab, KeyModifiers::SHIFT),
             ([], '[') => {
-                self.next = Next::Console;
+                self.next = NextCharacter::Console;
                 self.has_ended = false;
             }
             ([], 'M') if params.len() <= 1 && first == 0 => {
-                self.next = Next::Mouse(3);
+                self.next = NextCharacter::Mouse(3);
                 self.has_ended = false;
             }
             // With two numbers it is where the cursor is, not F3.
-            ([], 'R') if params.len() > 1 => self.answer(Answer::Other),
-            ([], 'I' | 'O') => self.answer(Answer::Focus { is_here: action == 'I' }),
+            ([], 'R') if params.len() > 1 => self.answer(TerminalReply::Other),
+            ([], 'I' | 'O') => self.answer(TerminalReply::Focus { is_here: action == 'I' }),
             // The window's size.
-            ([], 't') => self.answer(Answer::Other),
+            ([], 't') => self.answer(TerminalReply::Other),
             ([], letter) => {
                 if let Some(code) = letter_key(letter) {
                     self.key(code, modifiers(second));
                 }
             }
-            _ => self.answer(Answer::Other),
+            _ => self.answer(TerminalReply::Other),
         }
     }
 
     fn osc_dispatch(&mut self, params: &[&[u8]], _bell_terminated: bool) {
         self.has_ended = true;
-        self.answer(reports::command(params));
+        self.answer(control_strings::command(params));
     }
 
     fn hook(&mut self, params: &Params, intermediates: &[u8], _ignore: bool, action: char) {
         let first = params.iter().next().and_then(|it| it.first().copied()).unwrap_or(0);
-        self.report = Report::begin(intermediates, first, action);
+        self.report = ControlString::begin(intermediates, first, action);
     }
 
     fn put(&mut self, byte: u8) {

@@ -1,13 +1,13 @@
 //! Input from the terminal: keys, pasted text, and the terminal's answers.
 //!
 //! One thread polls the terminal and reads whatever is there, so that nothing waits for the next byte. [`Decoder`]
-//! turns bytes into [`Input`], and is the one place that knows how keys are encoded.
+//! turns bytes into [`DecodedInput`], and is the one place that knows how keys are encoded.
 
+mod control_strings;
+mod decoded;
 mod decoder;
 mod keys;
 mod paste;
-mod reports;
-mod sent;
 
 use std::io;
 use std::os::fd::AsFd;
@@ -19,11 +19,11 @@ use std::time::Instant;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
+pub(super) use self::decoded::DecodedInput;
 pub(super) use self::decoder::Decoder;
-pub(super) use self::sent::Input;
-use super::event::{Event, Source};
+use super::event::{Event, EventSource};
 
-/// Reads standard input, on a thread of its own, until it ends: then [`Source::Keys`] is lost.
+/// Reads standard input, on a thread of its own, until it ends: then [`EventSource::Keys`] is lost.
 ///
 /// # Errors
 /// The system has no thread left.
@@ -38,7 +38,7 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
                 }
             }
         }
-        let _ = events.send(Event::Lost(Source::Keys));
+        let _ = events.send(Event::Lost(EventSource::Keys));
     };
     thread::Builder::new().name("keys".to_owned()).spawn(read)?;
     Ok(())
@@ -62,7 +62,7 @@ fn was_held() -> bool {
 }
 
 /// Input of the next bytes; empty if there are none while the decoder waits. `None` if the terminal is gone.
-fn next(decoder: &mut Decoder) -> Option<Vec<Input>> {
+fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait(decoder.deadline());
     if was_held() {

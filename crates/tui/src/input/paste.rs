@@ -22,12 +22,12 @@ pub(super) struct Paste {
     bytes: usize,
     /// Bytes of the closing mark that have been seen.
     matched: usize,
-    sequence: Sequence,
+    sequence: ControlSequence,
 }
 
 /// State of a control sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sequence {
+enum ControlSequence {
     /// There is none.
     Outside,
     /// After ESC.
@@ -36,7 +36,7 @@ enum Sequence {
     Parameters,
 }
 
-impl Sequence {
+impl ControlSequence {
     /// State after one more byte. `None` if the byte is text.
     fn after(self, byte: u8) -> Option<Self> {
         match (self, byte) {
@@ -51,7 +51,7 @@ impl Sequence {
 
 impl Paste {
     pub(super) fn new(now: Instant) -> Self {
-        Self { begin: now, last: now, bytes: 0, matched: 0, sequence: Sequence::Outside }
+        Self { begin: now, last: now, bytes: 0, matched: 0, sequence: ControlSequence::Outside }
     }
 
     /// When it is over if nothing more comes.
@@ -66,7 +66,7 @@ impl Paste {
         if sequence.is_none() {
             self.last = now;
         }
-        self.sequence = sequence.unwrap_or(Sequence::Outside);
+        self.sequence = sequence.unwrap_or(ControlSequence::Outside);
         self.bytes = self.bytes.saturating_add(1);
         // No suffix of the mark's beginnings is a beginning of the mark but ESC itself.
         self.matched = match byte {

@@ -6,26 +6,26 @@ use proptest::prelude::*;
 use super::*;
 use crate::event::{Mouse, MouseKind};
 use crate::graphics::Protocol;
-use crate::known::Answer;
-use crate::terminals::{Brand, Terminal};
+use crate::terminal_replies::TerminalReply;
+use crate::terminals::{Brand, TerminalId};
 
 /// A decoder and its clock.
-struct Bench {
+struct DecoderBench {
     decoder: Decoder,
     now: Instant,
 }
 
-impl Bench {
+impl DecoderBench {
     fn new() -> Self {
         Self { decoder: Decoder::default(), now: Instant::now() }
     }
 
-    fn read(&mut self, bytes: &[u8]) -> Vec<Input> {
+    fn read(&mut self, bytes: &[u8]) -> Vec<DecodedInput> {
         self.decoder.decode(bytes, self.now)
     }
 
     /// Silence, as the reader sees it: it wakes at each deadline.
-    fn wait(&mut self, milliseconds: u64) -> Vec<Input> {
+    fn wait(&mut self, milliseconds: u64) -> Vec<DecodedInput> {
         let end = self.now + Duration::from_millis(milliseconds);
         let mut inputs = Vec::new();
         while let Some(deadline) = self.decoder.deadline().filter(|deadline| *deadline <= end) {
@@ -37,24 +37,24 @@ impl Bench {
     }
 }
 
-fn read(bytes: &[u8]) -> Vec<Input> {
-    Bench::new().read(bytes)
+fn read(bytes: &[u8]) -> Vec<DecodedInput> {
+    DecoderBench::new().read(bytes)
 }
 
-fn plain(character: char) -> Input {
-    Input::Key(KeyPress::plain(character))
+fn plain(character: char) -> DecodedInput {
+    DecodedInput::Key(KeyPress::plain(character))
 }
 
-fn special(code: KeyCode) -> Input {
-    Input::Key(KeyPress::special(code))
+fn special(code: KeyCode) -> DecodedInput {
+    DecodedInput::Key(KeyPress::special(code))
 }
 
-fn with(modifiers: KeyModifiers, code: KeyCode) -> Input {
-    Input::Key(KeyPress { code, modifiers })
+fn with(modifiers: KeyModifiers, code: KeyCode) -> DecodedInput {
+    DecodedInput::Key(KeyPress { code, modifiers })
 }
 
-const READY: Input = Input::Answer(Answer::Ready);
-const ESC: Input = Input::Key(KeyPress::special(KeyCode::Esc));
+const READY: DecodedInput = DecodedInput::TerminalReply(TerminalReply::Ready);
+const ESC: DecodedInput = DecodedInput::Key(KeyPress::special(KeyCode::Esc));
 
 #[test]
 fn keys_are_what_xterm_sends_for_them() {
@@ -66,10 +66,10 @@ fn keys_are_what_xterm_sends_for_them() {
         (b"\x7f", special(KeyCode::Backspace)),
         (b"\r", special(KeyCode::Enter)),
         (b"\t", special(KeyCode::Tab)),
-        (b"\x03", Input::Key(KeyPress::ctrl('c'))),
-        (b"\x1a", Input::Key(KeyPress::ctrl('z'))),
-        (b"\0", Input::Key(KeyPress::ctrl(' '))),
-        (b"\x1c", Input::Key(KeyPress::ctrl('4'))),
+        (b"\x03", DecodedInput::Key(KeyPress::ctrl('c'))),
+        (b"\x1a", DecodedInput::Key(KeyPress::ctrl('z'))),
+        (b"\0", DecodedInput::Key(KeyPress::ctrl(' '))),
+        (b"\x1c", DecodedInput::Key(KeyPress::ctrl('4'))),
         (b"\x1b[A", special(KeyCode::Up)),
         (b"\x1bOB", special(KeyCode::Down)),
         (b"\x1b[1;5C", with(With::CONTROL, KeyCode::Right)),
@@ -94,39 +94,42 @@ fn keys_are_what_xterm_sends_for_them() {
 #[test]
 fn answers_are_told_from_keys() {
     for (bytes, answer) in [
-        (&b"\x1b[0n"[..], Answer::Ready),
-        (b"\x1b[?62;1;2;22c", Answer::Attributes),
-        (b"\x1b[?6c", Answer::Attributes),
-        (b"\x1b[>0;276;0c", Answer::Other),
-        (b"\x1b[12;40R", Answer::Other),
-        (b"\x1b[?2026;2$y", Answer::Synchronized { is_known: true }),
-        (b"\x1b[?2026;0$y", Answer::Synchronized { is_known: false }),
-        (b"\x1b[?7;1$y", Answer::Other),
-        (b"\x1b]11;rgb:ffff/ffff/ffff\x07", Answer::Background([255; 3])),
-        (b"\x1b]11;?\x07", Answer::Other),
-        (b"\x1b]4;12;rgb:5c5c/5c5c/ffff\x1b\\", Answer::Ink { index: 12, rgb: [92, 92, 255] }),
-        (b"\x1bP1+r524742=38\x1b\\", Answer::TrueColor),
-        (b"\x1bP0+r524742\x1b\\", Answer::Other),
-        (b"\x1bP>|foot(1.20.2)\x1b\\", Answer::Name(Terminal { brand: Brand::Foot, version: [1, 20] })),
-        (b"\x1bP>|tmux 3.4\x1b\\", Answer::Other),
-        (b"\x1b[I", Answer::Focus { is_here: true }),
-        (b"\x1b[O", Answer::Focus { is_here: false }),
-        (b"\x1b[<2;10;20M", Answer::Other),
-        (b"\x1b[<35;10;20M", Answer::Other),
-        (b"\x1b[?997;1n", Answer::Other),
-        (b"\x1b_Gi=4211;OK\x1b\\", Answer::Images(Protocol::Kitty)),
-        (b"\x1b_Gi=4211;ENOTSUPPORTED\x1b\\", Answer::Other),
-        (b"\x1b_Gi=31;OK\x1b\\", Answer::Other),
+        (&b"\x1b[0n"[..], TerminalReply::Ready),
+        (b"\x1b[?62;1;2;22c", TerminalReply::Attributes),
+        (b"\x1b[?6c", TerminalReply::Attributes),
+        (b"\x1b[>0;276;0c", TerminalReply::Other),
+        (b"\x1b[12;40R", TerminalReply::Other),
+        (b"\x1b[?2026;2$y", TerminalReply::Synchronized { is_known: true }),
+        (b"\x1b[?2026;0$y", TerminalReply::Synchronized { is_known: false }),
+        (b"\x1b[?7;1$y", TerminalReply::Other),
+        (b"\x1b]11;rgb:ffff/ffff/ffff\x07", TerminalReply::Background([255; 3])),
+        (b"\x1b]11;?\x07", TerminalReply::Other),
+        (b"\x1b]4;12;rgb:5c5c/5c5c/ffff\x1b\\", TerminalReply::Ink { index: 12, rgb: [92, 92, 255] }),
+        (b"\x1bP1+r524742=38\x1b\\", TerminalReply::TrueColor),
+        (b"\x1bP0+r524742\x1b\\", TerminalReply::Other),
+        (
+            b"\x1bP>|foot(1.20.2)\x1b\\",
+            TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] }),
+        ),
+        (b"\x1bP>|tmux 3.4\x1b\\", TerminalReply::Other),
+        (b"\x1b[I", TerminalReply::Focus { is_here: true }),
+        (b"\x1b[O", TerminalReply::Focus { is_here: false }),
+        (b"\x1b[<2;10;20M", TerminalReply::Other),
+        (b"\x1b[<35;10;20M", TerminalReply::Other),
+        (b"\x1b[?997;1n", TerminalReply::Other),
+        (b"\x1b_Gi=4211;OK\x1b\\", TerminalReply::Images(Protocol::Kitty)),
+        (b"\x1b_Gi=4211;ENOTSUPPORTED\x1b\\", TerminalReply::Other),
+        (b"\x1b_Gi=31;OK\x1b\\", TerminalReply::Other),
     ] {
         let name = String::from_utf8_lossy(bytes).into_owned();
-        assert_eq!(read(bytes), [Input::Answer(answer)], "{name:?}");
-        let mut bench = Bench::new();
+        assert_eq!(read(bytes), [DecodedInput::TerminalReply(answer)], "{name:?}");
+        let mut bench = DecoderBench::new();
         let mut inputs = Vec::new();
         for byte in bytes {
             inputs.extend(bench.read(&[*byte]));
             inputs.extend(bench.wait(40));
         }
-        assert_eq!(inputs, [Input::Answer(answer)], "{name:?} byte by byte");
+        assert_eq!(inputs, [DecodedInput::TerminalReply(answer)], "{name:?} byte by byte");
     }
 }
 
@@ -141,10 +144,10 @@ fn the_left_button_and_the_wheel_are_heard() {
         (b"\x1b[<64;10;20M", WheelUp),
         (b"\x1b[<65;10;20M", WheelDown),
     ] {
-        let expected = Input::Mouse(Mouse { kind, column: 9, row: 19 });
+        let expected = DecodedInput::Mouse(Mouse { kind, column: 9, row: 19 });
         assert_eq!(read(bytes), [expected], "{bytes:?}");
-        let mut bench = Bench::new();
-        let inputs: Vec<Input> = bytes.iter().flat_map(|byte| bench.read(&[*byte])).collect();
+        let mut bench = DecoderBench::new();
+        let inputs: Vec<DecodedInput> = bytes.iter().flat_map(|byte| bench.read(&[*byte])).collect();
         assert_eq!(inputs, [expected], "{bytes:?} byte by byte");
     }
 }
@@ -156,31 +159,38 @@ fn the_oldest_form_of_the_mouse_is_no_keys() {
 
 #[test]
 fn an_escape_character_is_the_key_when_nothing_follows() {
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b"), []);
     assert_eq!(bench.wait(49), []);
     assert_eq!(bench.wait(1), [ESC]);
     assert_eq!(bench.read(b"q"), [plain('q')]);
     assert_eq!(read(b"\x1b\x1b[A"), [ESC, special(KeyCode::Up)]);
-    assert_eq!(read(b"\x1b\x03q"), [ESC, Input::Key(KeyPress::ctrl('c')), plain('q')]);
+    assert_eq!(read(b"\x1b\x03q"), [ESC, DecodedInput::Key(KeyPress::ctrl('c')), plain('q')]);
     assert_eq!(read("\x1béq".as_bytes()), [ESC, plain('é'), plain('q')]);
 }
 
 #[test]
 fn sixels_are_an_attribute() {
-    let answers = [Answer::Images(Protocol::Sixel), Answer::Attributes].map(Input::Answer);
+    let answers =
+        [TerminalReply::Images(Protocol::Sixel), TerminalReply::Attributes].map(DecodedInput::TerminalReply);
     assert_eq!(read(b"\x1b[?62;4;22c"), answers);
     assert_eq!(read(b"\x1b[?1;2;4c"), answers);
-    assert_eq!(read(b"\x1b[?44;14c"), [Input::Answer(Answer::Attributes)]);
+    assert_eq!(read(b"\x1b[?44;14c"), [DecodedInput::TerminalReply(TerminalReply::Attributes)]);
 }
 
 #[test]
 fn answers_about_images_eat_no_keys() {
     let keys = b"q\x1b_Gi=4211;OK\x1b\\s";
-    assert_eq!(read(keys), [plain('q'), Input::Answer(Answer::Images(Protocol::Kitty)), plain('s')]);
+    assert_eq!(
+        read(keys),
+        [plain('q'), DecodedInput::TerminalReply(TerminalReply::Images(Protocol::Kitty)), plain('s')]
+    );
     // The end of the answer is late.
-    let mut bench = Bench::new();
-    assert_eq!(bench.read(b"\x1b_Gi=4211;OK\x1b"), [Input::Answer(Answer::Images(Protocol::Kitty))]);
+    let mut bench = DecoderBench::new();
+    assert_eq!(
+        bench.read(b"\x1b_Gi=4211;OK\x1b"),
+        [DecodedInput::TerminalReply(TerminalReply::Images(Protocol::Kitty))]
+    );
     assert_eq!(bench.wait(300), []);
     assert_eq!(bench.read(b"\\s"), [plain('s')]);
 }
@@ -192,7 +202,7 @@ fn escape_and_a_quick_key_are_two_keys() {
         let key = char::from(key);
         let bytes = [b"\x1b".as_slice(), key.to_string().as_bytes(), b"q"].concat();
         assert_eq!(read(&bytes), [ESC, plain(key), plain('q')], "{key}");
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         assert_eq!(bench.read(b"\x1b"), []);
         bench.wait(20);
         assert_eq!(bench.read(&bytes[1..2]), [ESC, plain(key)], "{key}");
@@ -205,7 +215,7 @@ fn escape_and_a_quick_key_are_two_keys() {
     assert_eq!(read(b"\x1b[As\x1bs"), [special(KeyCode::Up), plain('s'), ESC, plain('s')]);
     // The beginning of a sequence that does not go on.
     for key in ['[', ']', 'P', 'O', 'X', '_'] {
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         assert_eq!(bench.read(format!("\x1b{key}").as_bytes()), []);
         assert_eq!(bench.wait(1000), [ESC, plain(key)]);
         assert_eq!(bench.read(b"q"), [plain('q')]);
@@ -217,11 +227,11 @@ fn what_follows_an_escape_character_late_is_still_its_sequence() {
     for (rest, input) in [
         (&b"[0n"[..], READY),
         (b"[A", special(KeyCode::Up)),
-        (b"[?62;22c", Input::Answer(Answer::Attributes)),
-        (b"[?2026;2$y", Input::Answer(Answer::Synchronized { is_known: true })),
-        (b"[24;80R", Input::Answer(Answer::Other)),
+        (b"[?62;22c", DecodedInput::TerminalReply(TerminalReply::Attributes)),
+        (b"[?2026;2$y", DecodedInput::TerminalReply(TerminalReply::Synchronized { is_known: true })),
+        (b"[24;80R", DecodedInput::TerminalReply(TerminalReply::Other)),
     ] {
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         bench.read(b"\x1b");
         assert_eq!(bench.wait(400), [ESC]);
         let mut inputs = Vec::new();
@@ -236,7 +246,7 @@ fn what_follows_an_escape_character_late_is_still_its_sequence() {
 #[test]
 fn a_bracket_typed_after_the_escape_key_is_a_key() {
     let after_escape = || {
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         bench.read(b"\x1b");
         assert_eq!(bench.wait(400), [ESC]);
         bench
@@ -257,21 +267,21 @@ fn a_bracket_typed_after_the_escape_key_is_a_key() {
 
 #[test]
 fn a_paste_is_one_event_and_its_text_is_no_keys() {
-    assert_eq!(read(b"a\x1b[200~q\x1b[20\x1b[201~b"), [plain('a'), Input::Paste, plain('b')]);
-    let mut bench = Bench::new();
+    assert_eq!(read(b"a\x1b[200~q\x1b[20\x1b[201~b"), [plain('a'), DecodedInput::Paste, plain('b')]);
+    let mut bench = DecoderBench::new();
     for byte in b"\x1b[200~quit\x1b[A\x03" {
         assert_eq!(bench.read(&[*byte]), []);
         assert_eq!(bench.wait(45), []);
     }
-    assert_eq!(bench.read(b"\x1b[201~q"), [Input::Paste, plain('q')]);
+    assert_eq!(bench.read(b"\x1b[201~q"), [DecodedInput::Paste, plain('q')]);
 }
 
 #[test]
 fn a_paste_without_an_end_is_over_by_silence() {
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     bench.read(b"\x1b[200~qqq");
     assert_eq!(bench.wait(999), []);
-    assert_eq!(bench.wait(1), [Input::Paste]);
+    assert_eq!(bench.wait(1), [DecodedInput::Paste]);
     assert_eq!(bench.read(b"q\x1b[201~"), [plain('q')], "a late end is nothing");
 
     bench.read(b"\x1b[200~");
@@ -280,67 +290,71 @@ fn a_paste_without_an_end_is_over_by_silence() {
         inputs.extend(bench.wait(500));
         inputs
     });
-    let keys: Vec<Input> = keys.collect();
-    assert_eq!((keys[0], keys[1]), (Input::Paste, plain('q')), "somebody presses a key again and again");
+    let keys: Vec<DecodedInput> = keys.collect();
+    assert_eq!(
+        (keys[0], keys[1]),
+        (DecodedInput::Paste, plain('q')),
+        "somebody presses a key again and again"
+    );
 
     let long = [&b"\x1b[200~"[..], &vec![b'q'; (1 << 20) + 3]].concat();
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     assert_eq!(bench.read(&long), []);
     assert_eq!(bench.wait(199), []);
-    assert_eq!(bench.wait(1), [Input::Paste], "after so much a short silence is enough");
+    assert_eq!(bench.wait(1), [DecodedInput::Paste], "after so much a short silence is enough");
     assert_eq!(bench.read(b"q"), [plain('q')]);
 }
 
 #[test]
 fn nothing_of_a_long_paste_is_a_key() {
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~"), []);
     for _ in 0..3000 {
         assert_eq!(bench.read(&[b'q'; 1000]), []);
         assert_eq!(bench.wait(5), []);
     }
-    assert_eq!(bench.read(b"q\x1b[201~c"), [Input::Paste, plain('c')], "3 MB, 15 s");
+    assert_eq!(bench.read(b"q\x1b[201~c"), [DecodedInput::Paste, plain('c')], "3 MB, 15 s");
 
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~"), []);
     for _ in 0..150 {
         assert_eq!(bench.read(b"q"), []);
         assert_eq!(bench.wait(100), []);
     }
-    assert_eq!(bench.read(b"q\x1b[201~c"), [Input::Paste, plain('c')], "over a thin line");
+    assert_eq!(bench.read(b"q\x1b[201~c"), [DecodedInput::Paste, plain('c')], "over a thin line");
 }
 
 #[test]
 fn text_that_waited_for_the_reader_is_still_of_its_paste() {
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~q"), []);
     // Nobody looked in between, so nobody knows that there was silence.
     bench.now += Duration::from_secs(60);
-    assert_eq!(bench.read(b"q\x1b[201~"), [Input::Paste]);
+    assert_eq!(bench.read(b"q\x1b[201~"), [DecodedInput::Paste]);
 }
 
 #[test]
 fn answers_do_not_keep_a_paste_open() {
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~q"), []);
     let mut found = Vec::new();
     for _ in 0..10 {
         found.extend(bench.read(b"\x1b[0n"));
         found.extend(bench.wait(150));
     }
-    assert_eq!(found[0], Input::Paste, "a second after the last text");
+    assert_eq!(found[0], DecodedInput::Paste, "a second after the last text");
     assert_eq!(bench.read(b"q"), [plain('q')]);
 }
 
 #[test]
 fn a_sequence_without_an_end_is_given_up() {
     for begun in [&b"\x1b]0;t"[..], b"\x1bP1", b"\x1b[1;", b"\x1bXx", b"\x1b[M"] {
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         assert_eq!(bench.read(begun), []);
         assert_eq!(bench.wait(1000), []);
         assert_eq!(bench.read(b"q"), [plain('q')], "{:?}", String::from_utf8_lossy(begun));
     }
-    let mut bench = Bench::new();
+    let mut bench = DecoderBench::new();
     bench.read(b"\x1b]");
     let mut keys = Vec::new();
     for _ in 0..10 {
@@ -369,7 +383,7 @@ proptest! {
         let text: Vec<u8> = parts.iter().flat_map(|part| words[*part]).copied().collect();
         let whole = read(&text);
         prop_assert_eq!(whole.len(), parts.len());
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         let (mut rest, mut split) = (&text[..], Vec::new());
         for cut in cuts {
             let (now, later) = rest.split_at(cut.min(rest.len()));
@@ -384,7 +398,7 @@ proptest! {
     /// Whatever comes, a key after a while is a key.
     #[test]
     fn nothing_holds_the_keyboard(bytes in prop::collection::vec(prop_oneof![Just(0x1b_u8), Just(b'['), Just(b']'), Just(b'P'), any::<u8>()], 0..300)) {
-        let mut bench = Bench::new();
+        let mut bench = DecoderBench::new();
         bench.read(&bytes);
         bench.wait(12_000);
         prop_assert_eq!(bench.decoder.deadline(), None);

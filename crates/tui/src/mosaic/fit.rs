@@ -1,15 +1,15 @@
-//! The best two colours and the best pattern for the pixels of a cell.
+//! The best two colors and the best pattern for the pixels of a cell.
 
-use super::tile::{Division, Grid, Tile};
+use super::tile::{CellDivision, Grid, Tile};
 use crate::color::oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
-/// A cell of two colours, in sRGB.
+/// A cell of two colors, in sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Fitted {
+pub(crate) struct FittedCell {
     pub(crate) tile: Tile,
-    /// Colours of the first and of the second part.
+    /// Colors of the first and of the second part.
     pub(crate) pair: [[u8; 3]; 2],
 }
 
@@ -17,28 +17,28 @@ pub(crate) struct Fitted {
 /// noise, and takes more bytes.
 const WORTH: f32 = 1e-4;
 
-/// The cell with the least squared distance in Oklab from these colours, in sRGB, of its pixels from the top left one along
+/// The cell with the least squared distance in Oklab from these colors, in sRGB, of its pixels from the top left one along
 /// the rows: of all ways to divide them the one with the smallest variance within the two parts.
-pub(crate) fn fit(grid: Grid, pixels: &[[u8; 3]]) -> Fitted {
+pub(crate) fn fit(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], Grid::Halves) = (pixels, grid) {
-        return Fitted { tile: Tile::HALVES, pair: [*first, *second] };
+        return FittedCell { tile: Tile::HALVES, pair: [*first, *second] };
     }
     let pixels: Vec<Vec3> = pixels.iter().map(|pixel| srgb8_to_linear(*pixel)).collect();
-    let Division { first, tile } = division(grid, &pixels);
+    let CellDivision { first, tile } = division(grid, &pixels);
     let mean = |is_first: bool| {
         let of_part = (0..pixels.len()).filter(|i| (first >> i & 1 == 1) == is_first);
         let count = of_part.clone().count().max(1);
         bytes(of_part.map(|i| pixels[i]).sum::<Vec3>() / count as f32)
     };
-    Fitted { tile, pair: [mean(true), mean(false)] }
+    FittedCell { tile, pair: [mean(true), mean(false)] }
 }
 
 /// The best division.
-fn division(grid: Grid, pixels: &[Vec3]) -> Division {
+fn division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| oklab(*pixel)).collect();
     let all: Vec3 = labs.iter().sum();
-    let (mut best, mut most) = (Division { first: 1, tile: Tile::HALVES }, f32::NEG_INFINITY);
+    let (mut best, mut most) = (CellDivision { first: 1, tile: Tile::HALVES }, f32::NEG_INFINITY);
     let (mut mask, mut sum, mut size) = (0_u32, Vec3::ZERO, 0.0_f32);
     for division in grid.divisions() {
         let mut changed = mask ^ division.first;
@@ -69,19 +69,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_colours_are_found_whatever_their_pattern() {
+    fn two_colors_are_found_whatever_their_pattern() {
         let colors = [[200, 20, 20], [20, 40, 180]];
         for grid in [Grid::Quadrants, Grid::Sextants, Grid::Octants] {
-            for Division { first, tile } in grid.divisions() {
+            for CellDivision { first, tile } in grid.divisions() {
                 let pixels: Vec<[u8; 3]> =
                     (0..2 * grid.rows()).map(|i| colors[usize::from(first >> i & 1 == 0)]).collect();
-                assert_eq!(fit(grid, &pixels), Fitted { tile: *tile, pair: colors });
+                assert_eq!(fit(grid, &pixels), FittedCell { tile: *tile, pair: colors });
             }
         }
     }
 
     #[test]
-    fn what_is_nearly_of_one_colour_is_in_halves() {
+    fn what_is_nearly_of_one_color_is_in_halves() {
         let pixels: Vec<[u8; 3]> = (0..4).map(|i| [150 + i % 3; 3]).collect();
         assert_eq!(fit(Grid::Quadrants, &pixels).tile, Tile::HALVES);
     }

@@ -31,7 +31,7 @@ impl Tile {
     /// A quarter of the foreground in the background. What is in between is drawn by each font in its own way.
     pub(crate) const LIGHT: Self = Self { first: 0x21_21_21, symbols: ['░', '▓'] };
 
-    /// Half of one and half of the other colour, finely mixed.
+    /// Half of one and half of the other color, finely mixed.
     pub(crate) const MEDIUM: Self = Self { first: CHECKS, symbols: ['▒', '▒'] };
 
     /// The characters that show the first and the second part by the foreground.
@@ -84,13 +84,13 @@ fn of_mask(mask: u32) -> Option<(Tile, bool)> {
 }
 
 /// Characters and the places that they fill.
-struct Table {
+struct TileTable {
     masks: HashMap<char, u32>,
     symbols: HashMap<u32, char>,
 }
 
-static TABLE: LazyLock<Table> = LazyLock::new(|| {
-    let mut table = Table { masks: HashMap::new(), symbols: HashMap::new() };
+static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
+    let mut table = TileTable { masks: HashMap::new(), symbols: HashMap::new() };
     let mut add = |symbol: char, mask: u32| {
         table.masks.entry(symbol).or_insert(mask);
         table.symbols.entry(mask).or_insert(symbol);
@@ -182,7 +182,7 @@ pub(crate) enum Grid {
 
 /// A way to divide a cell.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Division {
+pub(super) struct CellDivision {
     /// The pixels of the first part, from the top left one along the rows.
     pub(super) first: u32,
     pub(super) tile: Tile,
@@ -204,10 +204,10 @@ impl Grid {
     }
 
     /// All ways to divide a cell of two columns, the halves first. Most differ from the one before in one part.
-    pub(super) fn divisions(self) -> &'static [Division] {
-        static QUADRANTS: LazyLock<Vec<Division>> = LazyLock::new(|| divisions(2, &[2]));
-        static SEXTANTS: LazyLock<Vec<Division>> = LazyLock::new(|| divisions(6, &[2, 3]));
-        static OCTANTS: LazyLock<Vec<Division>> = LazyLock::new(|| divisions(4, &[4]));
+    pub(super) fn divisions(self) -> &'static [CellDivision] {
+        static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
+        static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));
+        static OCTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(4, &[4]));
         match self {
             Self::Halves => &[],
             Self::Quadrants => &QUADRANTS,
@@ -218,16 +218,16 @@ impl Grid {
 }
 
 /// The ways to fill parts of which these are in the height of a cell, in pixels of which so many are.
-fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<Division> {
-    let mut divisions = vec![Division { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
+fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
+    let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
         // Gray's code; the top left part is always in.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
             let of_tile = of_mask(spread(mask, *rows)).map(|(tile, _)| tile);
-            let is_new = |tile: &Tile| divisions.iter().all(|division: &Division| division.tile != *tile);
+            let is_new = |tile: &Tile| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
             if let Some(tile) = of_tile.filter(is_new) {
-                divisions.push(Division { first: widened(mask, *rows, pixel_rows), tile });
+                divisions.push(CellDivision { first: widened(mask, *rows, pixel_rows), tile });
             }
         }
     }
@@ -243,7 +243,7 @@ mod tests {
         for (grid, count) in [(Grid::Quadrants, 7), (Grid::Sextants, 31 + 6), (Grid::Octants, 127)] {
             let divisions = grid.divisions();
             let mut seen = std::collections::HashSet::new();
-            for Division { first, tile } in divisions {
+            for CellDivision { first, tile } in divisions {
                 assert_eq!(tile.first, widened(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
                 let [front, back] = tile.symbols();
                 assert_eq!(of_symbol(front), Some((*tile, false)), "{front}");

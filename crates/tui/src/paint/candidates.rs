@@ -1,39 +1,39 @@
-//! Colours that are worth being set at a cell.
+//! Colors that are worth being set at a cell.
 
+use super::cell::Mosaic;
 use super::cost_model::CostModel;
-use super::look::Mosaic;
-use super::shade::{Shade, digits};
+use super::terminal_color::{TerminalColor, digits};
 use crate::color::nearest_256;
 
 /// The most of them for one half, and for both together.
 const MOST: usize = 6;
-/// No colour is looked for that serves longer than this.
+/// No color is looked for that serves longer than this.
 const LONGEST: usize = 8;
 
-/// Themes of 22 colours put their own in the place of the first ones of the cube.
+/// Themes of 22 colors put their own in the place of the first ones of the cube.
 const FIRST_UNTOUCHED: u8 = 22;
 
-/// Colours for the parts of one cell.
+/// Colors for the parts of one cell.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Candidates {
-    pub(super) first: Vec<Shade>,
-    pub(super) second: Vec<Shade>,
+pub(super) struct CandidateColors {
+    pub(super) first: Vec<TerminalColor>,
+    pub(super) second: Vec<TerminalColor>,
     /// For both parts at once.
-    pub(super) both: Vec<Shade>,
+    pub(super) both: Vec<TerminalColor>,
 }
 
 /// For the first of these cells. Each candidate serves as many of the cells after it as it can.
-pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> Candidates {
+pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> CandidateColors {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
-    Candidates {
+    CandidateColors {
         first: shades(&column(0), model),
         second: shades(&column(1), model),
         both: shades(&both, model),
     }
 }
 
-fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), model: CostModel) -> Vec<Shade> {
+fn shades(wanted: &(impl Iterator<Item = TerminalColor> + Clone), model: CostModel) -> Vec<TerminalColor> {
     let mut shades = Vec::with_capacity(MOST);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {
@@ -41,15 +41,15 @@ fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), model: CostModel) -> V
             shades.push(shade);
         }
     };
-    let Shade::Rgb(_) = first else {
+    let TerminalColor::Rgb(_) = first else {
         add(first);
         return shades;
     };
     for span in model.spans {
         let box_ = common(wanted.clone(), *span);
-        add(Shade::Rgb(box_.shortest()));
+        add(TerminalColor::Rgb(box_.shortest()));
         let index = nearest_256(box_.mean());
-        let fixed = Shade::Palette(index);
+        let fixed = TerminalColor::Palette(index);
         if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.holds(rgb)) {
             add(fixed);
         }
@@ -57,19 +57,19 @@ fn shades(wanted: &(impl Iterator<Item = Shade> + Clone), model: CostModel) -> V
     shades
 }
 
-/// Colours that serve a row of wanted ones.
-struct Common {
+/// Colors that serve a row of wanted ones.
+struct CommonColors {
     low: [u8; 3],
     high: [u8; 3],
     sum: [u32; 3],
     count: u32,
 }
 
-/// The colours within `span` of as many as possible.
-fn common(wanted: impl Iterator<Item = Shade>, span: u8) -> Common {
-    let mut common = Common { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
+/// The colors within `span` of as many as possible.
+fn common(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
+    let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
-        let Shade::Rgb(rgb) = shade else { break };
+        let TerminalColor::Rgb(rgb) = shade else { break };
         let low = std::array::from_fn(|i| common.low[i].max(rgb[i].saturating_sub(span)));
         let high = std::array::from_fn(|i| common.high[i].min(rgb[i].saturating_add(span)));
         if (0..3).any(|i| low[i] > high[i]) {
@@ -82,7 +82,7 @@ fn common(wanted: impl Iterator<Item = Shade>, span: u8) -> Common {
     common
 }
 
-impl Common {
+impl CommonColors {
     fn mean(&self) -> [u8; 3] {
         let count = self.count.max(1);
         let mean = |i: usize| u8::try_from((self.sum[i] + count / 2) / count).unwrap_or(u8::MAX);
@@ -109,26 +109,34 @@ mod tests {
     use super::*;
 
     fn row(values: &[u8]) -> Vec<Option<Mosaic>> {
-        let halves = |value: &u8| Mosaic::halves([Shade::Rgb([*value, 50, 100]), Shade::Rgb([0, 0, 0])]);
+        let halves = |value: &u8| {
+            Mosaic::halves([TerminalColor::Rgb([*value, 50, 100]), TerminalColor::Rgb([0, 0, 0])])
+        };
         values.iter().map(|value| Some(halves(value))).collect()
     }
 
     #[test]
-    fn a_colour_serves_as_many_neighbours_as_it_can() {
+    fn a_color_serves_as_many_neighbors_as_it_can() {
         // 20 to 22 have 21 in common; 24 does not.
         let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
-        assert_eq!(found.first, [Shade::Rgb([21, 50, 99])]);
-        assert_eq!(found.second, [Shade::Rgb([0, 0, 0])], "16 may be another colour");
+        assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
+        assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "16 may be another color");
         assert_eq!(found.both.len(), 1, "the halves have nothing in common");
-        let greys = [Some(Mosaic::plain(Shade::Rgb([8, 8, 8])))];
-        assert_eq!(candidates(&greys, CostModel::EXACT).first, [Shade::Rgb([8, 8, 8]), Shade::Palette(232)]);
+        let grays = [Some(Mosaic::plain(TerminalColor::Rgb([8, 8, 8])))];
+        assert_eq!(
+            candidates(&grays, CostModel::EXACT).first,
+            [TerminalColor::Rgb([8, 8, 8]), TerminalColor::Palette(232)]
+        );
     }
 
     #[test]
-    fn what_is_no_colour_of_three_numbers_is_taken_as_it_is() {
-        let cells = [Some(Mosaic::halves([Shade::Ground, Shade::Palette(3)])), None];
+    fn what_is_no_color_of_three_numbers_is_taken_as_it_is() {
+        let cells = [Some(Mosaic::halves([TerminalColor::Ground, TerminalColor::Palette(3)])), None];
         let found = candidates(&cells, CostModel::MOVING);
-        assert_eq!((found.first, found.second), (vec![Shade::Ground], vec![Shade::Palette(3)]));
+        assert_eq!(
+            (found.first, found.second),
+            (vec![TerminalColor::Ground], vec![TerminalColor::Palette(3)])
+        );
         let found = candidates(&[None], CostModel::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());
     }

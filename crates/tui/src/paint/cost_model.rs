@@ -1,6 +1,6 @@
 //! The price of a byte in error.
 
-use super::shade::Shade;
+use super::terminal_color::TerminalColor;
 
 /// Weights of bytes against error. The error of a half of a cell is the sum of the squared differences of its channels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,18 +9,18 @@ pub(super) struct CostModel {
     pub(super) byte: f32,
     /// No channel may be farther off than this.
     pub(super) most: u8,
-    /// Neighbours that differ by twice this in no channel may become one colour: colours are tried for each.
+    /// Neighbours that differ by twice this in no channel may become one color: colors are tried for each.
     pub(super) spans: &'static [u8],
 }
 
 impl CostModel {
-    /// Every colour to 1/255.
+    /// Every color to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
-    /// Every colour, whatever it takes.
+    /// Every color, whatever it takes.
     pub(super) const ALL: Self = Self { byte: 64.0, most: 0, spans: &[0] };
 
-    /// An error of 14/255 in all channels of a half is about worth the bytes of a colour.
+    /// An error of 14/255 in all channels of a half is about worth the bytes of a color.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
     /// The same where a byte is worth this much, or as much as for a moving picture at least.
@@ -35,8 +35,8 @@ impl CostModel {
         Self { byte, spans, ..self }
     }
 
-    /// The error of showing one colour for another; infinite where that must not be.
-    pub(super) fn error(self, shown: Shade, wanted: Shade) -> f32 {
+    /// The error of showing one color for another; infinite where that must not be.
+    pub(super) fn error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;
         }
@@ -55,12 +55,12 @@ mod tests {
 
     #[test]
     fn errors_are_sums_of_squares_up_to_a_limit() {
-        let (a, b) = (Shade::Rgb([10, 20, 30]), Shade::Rgb([11, 20, 32]));
+        let (a, b) = (TerminalColor::Rgb([10, 20, 30]), TerminalColor::Rgb([11, 20, 32]));
         assert_eq!(CostModel::MOVING.error(a, b), 5.0);
         assert_eq!(CostModel::EXACT.error(a, b), f32::INFINITY);
-        assert_eq!(CostModel::EXACT.error(a, Shade::Rgb([9, 21, 30])), 2.0);
-        assert_eq!(CostModel::MOVING.error(Shade::Palette(16), Shade::Rgb([1, 1, 0])), 2.0);
-        assert_eq!(CostModel::MOVING.error(Shade::Ground, Shade::Palette(0)), f32::INFINITY);
-        assert_eq!(CostModel::MOVING.error(Shade::Ground, Shade::Ground), 0.0);
+        assert_eq!(CostModel::EXACT.error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
+        assert_eq!(CostModel::MOVING.error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])), 2.0);
+        assert_eq!(CostModel::MOVING.error(TerminalColor::Ground, TerminalColor::Palette(0)), f32::INFINITY);
+        assert_eq!(CostModel::MOVING.error(TerminalColor::Ground, TerminalColor::Ground), 0.0);
     }
 }

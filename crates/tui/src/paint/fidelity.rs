@@ -7,8 +7,8 @@ pub enum Fidelity {
     First,
     /// A picture of the same request that better ones will follow.
     Moving,
-    /// The same on a terminal that can follow the render: every colour.
+    /// The same on a terminal that can follow the render: every color.
     Following,
-    /// A picture that stays: every colour to 1/255.
+    /// A picture that stays: every color to 1/255.
     Still,
 }

@@ -6,7 +6,7 @@ use super::fidelity::Fidelity;
 
 /// The moment at which there is a picture that was not aimed at yet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct FrameTiming {
     /// Bytes per second of the line. `None` if it is faster than anybody noticed.
     pub bytes_per_second: Option<f64>,
     /// Cells of the picture.
@@ -31,7 +31,7 @@ pub struct Moment {
 
 /// Advice about a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Advice {
+pub enum PacingAdvice {
     /// Aim at it.
     Aim(Fidelity),
     /// Wait for a better one.
@@ -58,20 +58,20 @@ const SHARE: f64 = 0.5;
 /// Whether a picture is worth its bytes. The first and the last one always are. A quick terminal gets every picture, 5 to
 /// 10 times a second. On a line that takes long for a picture there are few in between, and none that would keep the
 /// last one waiting.
-pub fn advise(moment: &Moment) -> Advice {
+pub fn advise(moment: &FrameTiming) -> PacingAdvice {
     if moment.is_final {
-        return Advice::Aim(Fidelity::Still);
+        return PacingAdvice::Aim(Fidelity::Still);
     }
-    let Some(aimed) = moment.aimed_samples else { return Advice::Aim(Fidelity::First) };
+    let Some(aimed) = moment.aimed_samples else { return PacingAdvice::Aim(Fidelity::First) };
     if moment.is_quick {
         let is_due = moment.is_shown && moment.since_aim >= moment.shortest();
-        return if is_due { Advice::Aim(Fidelity::Following) } else { Advice::Wait };
+        return if is_due { PacingAdvice::Aim(Fidelity::Following) } else { PacingAdvice::Wait };
     }
     let frame = moment.frame();
     let is_too_late = moment.final_in.is_some_and(|left| left < frame);
     let is_too_soon = moment.since_aim < SHORTEST.max(frame.div_f64(SHARE));
     if is_too_late || is_too_soon {
-        return Advice::Wait;
+        return PacingAdvice::Wait;
     }
     let is_better = |factor: f64| moment.samples >= (aimed * factor).max(1.0) && moment.samples > aimed;
     let is_worth_it = if moment.is_shown {
@@ -81,10 +81,10 @@ pub fn advise(moment: &Moment) -> Advice {
     } else {
         is_better(MANY_MORE_SAMPLES)
     };
-    if is_worth_it { Advice::Aim(Fidelity::Moving) } else { Advice::Wait }
+    if is_worth_it { PacingAdvice::Aim(Fidelity::Moving) } else { PacingAdvice::Wait }
 }
 
-impl Moment {
+impl FrameTiming {
     /// The time between two pictures on a quick terminal.
     fn shortest(&self) -> Duration {
         if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     /// A second after an aim at one sample.
-    const MOMENT: Moment = Moment {
+    const MOMENT: FrameTiming = FrameTiming {
         bytes_per_second: None,
         cells: 2500,
         samples: 1.5,
@@ -124,57 +124,82 @@ mod tests {
         final_in: None,
     };
 
-    const MOVING: Advice = Advice::Aim(Fidelity::Moving);
+    const MOVING: PacingAdvice = PacingAdvice::Aim(Fidelity::Moving);
 
     #[test]
     fn the_first_and_the_last_picture_are_drawn_whatever_the_line() {
         for bytes_per_second in [None, Some(0.0), Some(100.0), Some(f64::NAN)] {
-            let slow = Moment { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
-            assert_eq!(advise(&Moment { aimed_samples: None, ..slow }), Advice::Aim(Fidelity::First));
-            assert_eq!(advise(&Moment { is_final: true, ..slow }), Advice::Aim(Fidelity::Still));
+            let slow = FrameTiming { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
+            assert_eq!(
+                advise(&FrameTiming { aimed_samples: None, ..slow }),
+                PacingAdvice::Aim(Fidelity::First)
+            );
+            assert_eq!(advise(&FrameTiming { is_final: true, ..slow }), PacingAdvice::Aim(Fidelity::Still));
         }
     }
 
     #[test]
     fn a_picture_on_the_way_has_twice_the_samples() {
-        assert_eq!(advise(&MOMENT), Advice::Wait);
-        assert_eq!(advise(&Moment { samples: 2.0, ..MOMENT }), MOVING);
-        let late = Moment { since_aim: Duration::from_secs(3), ..MOMENT };
+        assert_eq!(advise(&MOMENT), PacingAdvice::Wait);
+        assert_eq!(advise(&FrameTiming { samples: 2.0, ..MOMENT }), MOVING);
+        let late = FrameTiming { since_aim: Duration::from_secs(3), ..MOMENT };
         assert_eq!(advise(&late), MOVING, "or it is a while ago");
-        assert_eq!(advise(&Moment { samples: 1.0, ..late }), Advice::Wait, "but not the same one again");
+        assert_eq!(
+            advise(&FrameTiming { samples: 1.0, ..late }),
+            PacingAdvice::Wait,
+            "but not the same one again"
+        );
     }
 
     #[test]
     fn a_quick_terminal_gets_every_picture_5_to_10_times_a_second() {
-        let following = Advice::Aim(Fidelity::Following);
-        let quick = Moment { is_quick: true, since_aim: Duration::from_millis(100), ..MOMENT };
+        let following = PacingAdvice::Aim(Fidelity::Following);
+        let quick = FrameTiming { is_quick: true, since_aim: Duration::from_millis(100), ..MOMENT };
         assert_eq!(advise(&quick), following, "however few samples are new");
-        assert_eq!(advise(&Moment { samples: 0.5, ..quick }), following, "their number may be told late");
-        assert_eq!(advise(&Moment { since_aim: Duration::from_millis(99), ..quick }), Advice::Wait);
-        assert_eq!(advise(&Moment { is_shown: false, ..quick }), Advice::Wait, "one after the other");
-        let in_pixels = Moment { is_in_pixels: true, ..quick };
-        assert_eq!(advise(&in_pixels), Advice::Wait);
-        assert_eq!(advise(&Moment { since_aim: Duration::from_millis(200), ..in_pixels }), following);
+        assert_eq!(
+            advise(&FrameTiming { samples: 0.5, ..quick }),
+            following,
+            "their number may be told late"
+        );
+        assert_eq!(
+            advise(&FrameTiming { since_aim: Duration::from_millis(99), ..quick }),
+            PacingAdvice::Wait
+        );
+        assert_eq!(
+            advise(&FrameTiming { is_shown: false, ..quick }),
+            PacingAdvice::Wait,
+            "one after the other"
+        );
+        let in_pixels = FrameTiming { is_in_pixels: true, ..quick };
+        assert_eq!(advise(&in_pixels), PacingAdvice::Wait);
+        assert_eq!(advise(&FrameTiming { since_aim: Duration::from_millis(200), ..in_pixels }), following);
     }
 
     #[test]
     fn the_first_pass_is_shown_in_parts() {
-        let coarse = Moment { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
-        assert_eq!(advise(&coarse), Advice::Wait);
-        assert_eq!(advise(&Moment { samples: 0.25, ..coarse }), MOVING);
-        assert_eq!(advise(&Moment { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
+        let coarse = FrameTiming { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
+        assert_eq!(advise(&coarse), PacingAdvice::Wait);
+        assert_eq!(advise(&FrameTiming { samples: 0.25, ..coarse }), MOVING);
+        assert_eq!(advise(&FrameTiming { samples: 1.0, aimed_samples: Some(0.5), ..coarse }), MOVING);
     }
 
     #[test]
     fn on_a_thin_line_pictures_are_few() {
         // 15 kB: a quarter of a second at 60 kB/s.
-        let thin = Moment { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
+        let thin = FrameTiming { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
         assert_eq!(advise(&thin), MOVING);
-        assert_eq!(advise(&Moment { since_aim: Duration::from_millis(400), ..thin }), Advice::Wait);
-        assert_eq!(advise(&Moment { is_shown: false, ..thin }), Advice::Wait, "the one before is on its way");
-        assert_eq!(advise(&Moment { is_shown: false, samples: 4.0, ..thin }), MOVING, "but much worse");
-        let ending = Moment { final_in: Some(Duration::from_millis(200)), ..thin };
-        assert_eq!(advise(&ending), Advice::Wait, "the last one would wait for it");
+        assert_eq!(
+            advise(&FrameTiming { since_aim: Duration::from_millis(400), ..thin }),
+            PacingAdvice::Wait
+        );
+        assert_eq!(
+            advise(&FrameTiming { is_shown: false, ..thin }),
+            PacingAdvice::Wait,
+            "the one before is on its way"
+        );
+        assert_eq!(advise(&FrameTiming { is_shown: false, samples: 4.0, ..thin }), MOVING, "but much worse");
+        let ending = FrameTiming { final_in: Some(Duration::from_millis(200)), ..thin };
+        assert_eq!(advise(&ending), PacingAdvice::Wait, "the last one would wait for it");
     }
 
     #[test]
@@ -184,14 +209,14 @@ mod tests {
             // 2.5 seconds, a preview every 66 ms.
             for preview in 0..38_u32 {
                 let seconds = f64::from(preview) * 0.066;
-                let moment = Moment {
+                let moment = FrameTiming {
                     bytes_per_second,
                     samples: seconds / 2.5 * 64.0,
                     aimed_samples: aimed,
                     since_aim: Duration::from_secs_f64(seconds - at),
                     ..MOMENT
                 };
-                if advise(&moment) != Advice::Wait {
+                if advise(&moment) != PacingAdvice::Wait {
                     (aimed, at, count) = (Some(moment.samples), seconds, count + 1);
                 }
             }

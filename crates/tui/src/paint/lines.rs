@@ -4,10 +4,10 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::style::Color;
 
 use super::pen::Pen;
-use super::shade::{Layer, Shade};
+use super::terminal_color::{ColorLayer, TerminalColor};
 
-/// The rows of a buffer, each with a line end and without the blanks before it. Each begins and ends with the terminal's own colours;
-/// without colours there is no escape sequence at all.
+/// The rows of a buffer, each with a line end and without the blanks before it. Each begins and ends with the terminal's own colors;
+/// without colors there is no escape sequence at all.
 pub fn in_lines(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {
@@ -31,8 +31,8 @@ fn is_seen(cell: &Cell) -> bool {
 
 fn pen_of(cell: &Cell) -> Pen {
     Pen {
-        fg: Shade::of(cell.fg, Layer::Foreground),
-        bg: Shade::of(cell.bg, Layer::Background),
+        fg: TerminalColor::of(cell.fg, ColorLayer::Foreground),
+        bg: TerminalColor::of(cell.bg, ColorLayer::Background),
         modifier: cell.modifier,
         link: 0,
     }
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_line_ends_with_the_colours_of_the_terminal() {
+    fn each_line_ends_with_the_colors_of_the_terminal() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 3));
         buffer.set_string(0, 0, "ab", Style::new().fg(Color::Red));
         buffer.set_string(2, 2, "▀", Style::new().fg(Color::Rgb(1, 2, 3)).bg(Color::Indexed(9)));

@@ -1,14 +1,14 @@
-//! Colours and modifiers that the terminal writes with.
+//! Colors and modifiers that the terminal writes with.
 
 use ratatui::style::Modifier;
 
-use super::shade::{Layer, Shade, push_number};
+use super::terminal_color::{ColorLayer, TerminalColor, push_number};
 
-/// Colours and modifiers of the next character.
+/// Colors and modifiers of the next character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pen {
-    pub(super) fg: Shade,
-    pub(super) bg: Shade,
+    pub(super) fg: TerminalColor,
+    pub(super) bg: TerminalColor,
     pub(super) modifier: Modifier,
     /// Number of the link that the character belongs to; 0 for none.
     pub(super) link: u16,
@@ -16,11 +16,11 @@ pub(super) struct Pen {
 
 /// Requirements on a pen.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wish {
+pub(super) struct PenRequirements {
     /// None: any.
-    pub(super) fg: Option<Shade>,
+    pub(super) fg: Option<TerminalColor>,
     /// None: any.
-    pub(super) bg: Option<Shade>,
+    pub(super) bg: Option<TerminalColor>,
     /// Modifiers, of those that matter.
     pub(super) modifier: Modifier,
     /// The others may be on or off.
@@ -45,11 +45,11 @@ const MODIFIERS: [(Modifier, u16, u16); 9] = [
 impl Pen {
     /// After SGR 0.
     pub(super) const RESET: Self =
-        Self { fg: Shade::Ink, bg: Shade::Ground, modifier: Modifier::empty(), link: 0 };
+        Self { fg: TerminalColor::Ink, bg: TerminalColor::Ground, modifier: Modifier::empty(), link: 0 };
 
     /// This pen and nothing else.
-    pub(super) fn exactly(self) -> Wish {
-        Wish {
+    pub(super) fn exactly(self) -> PenRequirements {
+        PenRequirements {
             fg: Some(self.fg),
             bg: Some(self.bg),
             modifier: self.modifier,
@@ -60,7 +60,7 @@ impl Pen {
 
     /// Appends the shortest SGR that turns the pen into one that fulfils the wish; appends nothing if the pen does already. Links
     /// are the screen's.
-    pub(super) fn turn(&mut self, wish: &Wish, out: &mut Vec<u8>) {
+    pub(super) fn turn(&mut self, wish: &PenRequirements, out: &mut Vec<u8>) {
         let mut list = Vec::new();
         let changed = self.changed(wish, &mut list);
         if list.is_empty() {
@@ -76,7 +76,7 @@ impl Pen {
     }
 
     /// Appends the parameters that turn this pen into one as wished, which is returned.
-    fn changed(mut self, wish: &Wish, list: &mut Vec<u8>) -> Self {
+    fn changed(mut self, wish: &PenRequirements, list: &mut Vec<u8>) -> Self {
         let surplus = (self.modifier - wish.modifier) & wish.matters;
         for (modifier, _, off) in MODIFIERS {
             if surplus.contains(modifier) && self.modifier.contains(modifier) {
@@ -95,7 +95,7 @@ impl Pen {
         }
         self.modifier |= missing;
         for (own, wished, layer) in
-            [(&mut self.fg, wish.fg, Layer::Foreground), (&mut self.bg, wish.bg, Layer::Background)]
+            [(&mut self.fg, wish.fg, ColorLayer::Foreground), (&mut self.bg, wish.bg, ColorLayer::Background)]
         {
             if let Some(shade) = wished.filter(|shade| shade != own) {
                 separate(list);
@@ -134,31 +134,34 @@ mod tests {
     #[test]
     fn what_stays_is_not_sent() {
         let bold = Pen { modifier: Modifier::BOLD, ..Pen::RESET };
-        let red = Pen { fg: Shade::Palette(1), ..bold };
+        let red = Pen { fg: TerminalColor::Palette(1), ..bold };
         assert_eq!(turned(red, red), "");
         assert_eq!(turned(Pen::RESET, red), "\x1b[1;31m");
         assert_eq!(turned(red, bold), "\x1b[39m");
         assert_eq!(turned(red, Pen::RESET), "\x1b[0m");
         let dim = Pen { modifier: Modifier::DIM, ..red };
         assert_eq!(turned(red, dim), "\x1b[22;2m");
-        let colours = Pen { fg: Shade::Rgb([1, 2, 3]), bg: Shade::Rgb([4, 5, 6]), ..Pen::RESET };
-        assert_eq!(turned(red, colours), "\x1b[0;38;2;1;2;3;48;2;4;5;6m");
+        let colors =
+            Pen { fg: TerminalColor::Rgb([1, 2, 3]), bg: TerminalColor::Rgb([4, 5, 6]), ..Pen::RESET };
+        assert_eq!(turned(red, colors), "\x1b[0;38;2;1;2;3;48;2;4;5;6m");
     }
 
     fn pen() -> impl Strategy<Value = Pen> {
         let shade = |own| {
             prop_oneof![
                 Just(own),
-                any::<u8>().prop_map(Shade::Palette),
-                any::<[u8; 3]>().prop_map(Shade::Rgb)
+                any::<u8>().prop_map(TerminalColor::Palette),
+                any::<[u8; 3]>().prop_map(TerminalColor::Rgb)
             ]
         };
-        (shade(Shade::Ink), shade(Shade::Ground), any::<u16>()).prop_map(|(fg, bg, bits)| Pen {
-            fg,
-            bg,
-            // Some terminals cannot have both.
-            modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
-            link: 0,
+        (shade(TerminalColor::Ink), shade(TerminalColor::Ground), any::<u16>()).prop_map(|(fg, bg, bits)| {
+            Pen {
+                fg,
+                bg,
+                // Some terminals cannot have both.
+                modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
+                link: 0,
+            }
         })
     }
 
@@ -185,11 +188,11 @@ mod tests {
                 }
                 let shade = |color, own| match color {
                     vt100::Color::Default => own,
-                    vt100::Color::Idx(index) => Shade::Palette(index),
-                    vt100::Color::Rgb(r, g, b) => Shade::Rgb([r, g, b]),
+                    vt100::Color::Idx(index) => TerminalColor::Palette(index),
+                    vt100::Color::Rgb(r, g, b) => TerminalColor::Rgb([r, g, b]),
                 };
-                prop_assert_eq!(shade(screen.fgcolor(), Shade::Ink), pen.fg);
-                prop_assert_eq!(shade(screen.bgcolor(), Shade::Ground), pen.bg);
+                prop_assert_eq!(shade(screen.fgcolor(), TerminalColor::Ink), pen.fg);
+                prop_assert_eq!(shade(screen.bgcolor(), TerminalColor::Ground), pen.bg);
             }
         }
     }

@@ -1,13 +1,13 @@
 //! The picture: as near to what is wanted as the bytes allow.
 
+use super::cell::CellContent;
 use super::cost_model::CostModel;
+use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
-use super::look::Look;
-use super::memory::Memory;
-use super::moves::Place;
-use super::row_optimizer::{Dab, Row, Start, Target, row};
-use super::screen::{Screen, Stroke};
-use super::wanted::Wanted;
+use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, row};
+use super::screen::{ScreenModel, Stroke};
+use super::stable_cells::StableCells;
+use super::target_screen::TargetScreen;
 
 /// Bytes that a cell of a first picture may take, in the mean over the rows so far.
 const FIRST_BYTES: u32 = 12;
@@ -20,20 +20,20 @@ const DEAREST: f32 = 4000.0;
 
 /// Bytes left for the rows of a first picture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Budget {
+pub(super) struct ByteBudget {
     bytes: u32,
     model: CostModel,
 }
 
-impl Default for Budget {
+impl Default for ByteBudget {
     fn default() -> Self {
         Self { bytes: 0, model: CostModel::MOVING }
     }
 }
 
-impl Budget {
+impl ByteBudget {
     /// The row at the least error that the bytes allow. Bytes get cheaper after rows that left some.
-    fn spend(&mut self, targets: &[Target], start: Start) -> Row {
+    fn spend(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
@@ -53,20 +53,20 @@ impl Budget {
 
 /// Plans the strokes of the picture in a row.
 pub(super) fn plan(
-    screen: &Screen,
-    wanted: &Wanted,
-    memory: &Memory,
+    screen: &ScreenModel,
+    wanted: &TargetScreen,
+    memory: &StableCells,
     y: u16,
     can_repeat: bool,
-    budget: &mut Budget,
+    budget: &mut ByteBudget,
 ) -> Vec<Stroke> {
     let columns = wanted.picture.left()..wanted.picture.right();
-    let targets: Vec<Target> =
-        columns.clone().map(|x| target(screen, wanted, memory, Place { x, y })).collect();
-    let start = Start {
+    let targets: Vec<TargetCell> =
+        columns.clone().map(|x| target(screen, wanted, memory, CellPosition { x, y })).collect();
+    let start = RowStart {
         fg: screen.pen.fg,
         bg: screen.pen.bg,
-        is_there: screen.cursor == Some(Place { x: columns.start, y }),
+        is_there: screen.cursor == Some(CellPosition { x: columns.start, y }),
     };
     let row = match wanted.fidelity {
         Fidelity::Still => row(&targets, start, CostModel::EXACT),
@@ -74,8 +74,8 @@ pub(super) fn plan(
         Fidelity::Moving => row(&targets, start, CostModel::MOVING),
         Fidelity::First => budget.spend(&targets, start),
     };
-    let stroke = |dab: Dab| Stroke::Mosaic {
-        at: Place { x: columns.start + dab.column as u16, y },
+    let stroke = |dab: DrawOp| Stroke::Mosaic {
+        at: CellPosition { x: columns.start + dab.column as u16, y },
         glyph: dab.glyph,
         mosaic: dab.mosaic,
         count: 1,
@@ -84,11 +84,11 @@ pub(super) fn plan(
     if can_repeat { Stroke::repeated(&strokes) } else { strokes }
 }
 
-fn target(screen: &Screen, wanted: &Wanted, memory: &Memory, at: Place) -> Target {
+fn target(screen: &ScreenModel, wanted: &TargetScreen, memory: &StableCells, at: CellPosition) -> TargetCell {
     let shown = match screen.look(at) {
-        Look::Mosaic(mosaic) => Some(*mosaic),
-        Look::Unknown | Look::Text(_) | Look::Covered => None,
+        CellContent::Mosaic(mosaic) => Some(*mosaic),
+        CellContent::Unknown | CellContent::Text(_) | CellContent::Covered => None,
     };
     let wanted = wanted.mosaic(at.x, at.y).map(|wanted| memory.mosaic(at, wanted, shown));
-    Target { wanted, shown }
+    TargetCell { wanted, shown }
 }

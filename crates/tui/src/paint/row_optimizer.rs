@@ -1,13 +1,13 @@
 //! The cheapest way through a row of the picture.
 //!
 //! A cell can be left as it is or be drawn: by one of four glyphs, with the pen as it is or with one or both of its
-//! colours changed. What that costs depends on the pen and on where the cursor was left, so that the best way
+//! colors changed. What that costs depends on the pen and on where the cursor was left, so that the best way
 //! to a cell is kept for each of a few pens (the Viterbi algorithm as a beam search), and the cheapest end is traced back.
 
-use super::candidates::{Candidates, candidates};
+use super::candidates::{CandidateColors, candidates};
+use super::cell::{Glyph, Mosaic};
 use super::cost_model::CostModel;
-use super::look::{Glyph, Mosaic};
-use super::shade::{Layer, Shade, digits};
+use super::terminal_color::{ColorLayer, TerminalColor, digits};
 use crate::mosaic::{PLACES, Tile};
 
 /// Ways that are kept from cell to cell.
@@ -17,7 +17,7 @@ const MOST_BYTES: f32 = 46.0;
 
 /// A cell of the row.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Target {
+pub(super) struct TargetCell {
     /// None: the cell is not of the picture.
     pub(super) wanted: Option<Mosaic>,
     /// None: nothing that could stay.
@@ -26,16 +26,16 @@ pub(super) struct Target {
 
 /// Pen and cursor at the beginning of a row.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Start {
-    pub(super) fg: Shade,
-    pub(super) bg: Shade,
+pub(super) struct RowStart {
+    pub(super) fg: TerminalColor,
+    pub(super) bg: TerminalColor,
     /// Whether the cursor is at the first cell.
     pub(super) is_there: bool,
 }
 
 /// One cell drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Dab {
+pub(super) struct DrawOp {
     /// Counted from the first target.
     pub(super) column: usize,
     pub(super) glyph: Glyph,
@@ -44,12 +44,12 @@ pub(super) struct Dab {
 
 /// A way through the row up to a cell.
 #[derive(Clone, Copy, Debug)]
-struct Way {
-    fg: Shade,
-    bg: Shade,
-    /// Both colours as one number.
+struct DrawPath {
+    fg: TerminalColor,
+    bg: TerminalColor,
+    /// Both colors as one number.
     pen: u64,
-    gap: Gap,
+    gap: CursorGap,
     bytes: u32,
     /// Bytes and errors.
     cost: f32,
@@ -59,20 +59,20 @@ struct Way {
     glyph: Option<Glyph>,
 }
 
-/// Two colours as one number.
-fn pen(fg: Shade, bg: Shade) -> u64 {
+/// Two colors as one number.
+fn pen(fg: TerminalColor, bg: TerminalColor) -> u64 {
     u64::from(fg.number()) << 32 | u64::from(bg.number())
 }
 
 /// Cells between the cursor and the next one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Gap {
+enum CursorGap {
     /// The cursor is in another row.
     Far,
     Cells(u8),
 }
 
-impl Gap {
+impl CursorGap {
     fn bytes(self) -> u32 {
         match self {
             Self::Far => 8,
@@ -92,16 +92,16 @@ impl Gap {
 
 /// Strokes of a row.
 #[derive(Clone, Debug)]
-pub(super) struct Row {
-    pub(super) dabs: Vec<Dab>,
+pub(super) struct PlannedRow {
+    pub(super) dabs: Vec<DrawOp>,
     pub(super) bytes: u32,
 }
 
 /// The way through the row at the least cost.
-pub(super) fn row(targets: &[Target], start: Start, model: CostModel) -> Row {
-    let gap = if start.is_there { Gap::Cells(0) } else { Gap::Far };
-    let Start { fg, bg, .. } = start;
-    let first = Way { fg, bg, pen: pen(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
+pub(super) fn row(targets: &[TargetCell], start: RowStart, model: CostModel) -> PlannedRow {
+    let gap = if start.is_there { CursorGap::Cells(0) } else { CursorGap::Far };
+    let RowStart { fg, bg, .. } = start;
+    let first = DrawPath { fg, bg, pen: pen(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
     let mut ways = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
@@ -112,7 +112,7 @@ pub(super) fn row(targets: &[Target], start: Start, model: CostModel) -> Row {
 }
 
 /// The ways on to the next cell.
-fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], model: CostModel) -> Vec<Way> {
+fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model: CostModel) -> Vec<DrawPath> {
     let mut beam = Beam { ways: Vec::with_capacity(BEAM), limit: MOST_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
@@ -123,18 +123,18 @@ fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], model: CostMode
     };
     if leave.is_finite() {
         for (parent, way) in last.iter().enumerate() {
-            beam.add(Way { gap: way.gap.wider(), cost: way.cost + leave, parent, glyph: None, ..*way });
+            beam.add(DrawPath { gap: way.gap.wider(), cost: way.cost + leave, parent, glyph: None, ..*way });
         }
     }
     let Some(mosaic) = target.wanted else { return beam.ways };
-    // What is near enough is not worth a new colour, but may be drawn again instead of jumped over.
-    let changes = if leave <= model.byte { Candidates::default() } else { candidates(wanted, model) };
-    let changes = Changes::new(&changes, mosaic, model);
+    // What is near enough is not worth a new color, but may be drawn again instead of jumped over.
+    let changes = if leave <= model.byte { CandidateColors::default() } else { candidates(wanted, model) };
+    let changes = ColorChanges::new(&changes, mosaic, model);
     for (parent, way) in last.iter().enumerate() {
         changes.turn_one(parent, way, &mut beam);
     }
-    // Where both colours are set, nothing is left of the pen: the cheapest way goes on.
-    let base = |way: &Way| way.cost + way.gap.bytes() as f32 * model.byte;
+    // Where both colors are set, nothing is left of the pen: the cheapest way goes on.
+    let base = |way: &DrawPath| way.cost + way.gap.bytes() as f32 * model.byte;
     if let Some((parent, way)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
     {
         changes.turn_both(parent, way, &mut beam);
@@ -144,14 +144,14 @@ fn step(last: &[Way], target: Target, wanted: &[Option<Mosaic>], model: CostMode
 
 /// The best ways so far.
 struct Beam {
-    ways: Vec<Way>,
+    ways: Vec<DrawPath>,
     /// Ways that cost this much more than the best are not kept.
     limit: f32,
 }
 
 impl Beam {
-    fn add(&mut self, way: Way) {
-        let is_same = |other: &Way| other.pen == way.pen && other.gap == way.gap;
+    fn add(&mut self, way: DrawPath) {
+        let is_same = |other: &DrawPath| other.pen == way.pen && other.gap == way.gap;
         if let Some(other) = self.ways.iter_mut().find(|other| is_same(other)) {
             if way.cost < other.cost {
                 *other = way;
@@ -175,10 +175,10 @@ impl Beam {
     }
 }
 
-/// A colour that may be set at a cell, with what follows.
+/// A color that may be set at a cell, with what follows.
 #[derive(Clone, Copy)]
-struct Change {
-    shade: Shade,
+struct ColorChange {
+    shade: TerminalColor,
     /// Bytes of the SGR parameters.
     bytes: u32,
     /// In the first and the second part.
@@ -186,28 +186,31 @@ struct Change {
 }
 
 /// Changes that may be drawn at a cell.
-struct Changes {
+struct ColorChanges {
     mosaic: Mosaic,
     model: CostModel,
-    all: Vec<Change>,
+    all: Vec<ColorChange>,
     /// Number of changes of the first part; those of the second part follow.
     first: usize,
     second: usize,
 }
 
-impl Changes {
-    fn new(candidates: &Candidates, mosaic: Mosaic, model: CostModel) -> Self {
-        let Candidates { first, second, both } = candidates;
+impl ColorChanges {
+    fn new(candidates: &CandidateColors, mosaic: Mosaic, model: CostModel) -> Self {
+        let CandidateColors { first, second, both } = candidates;
         let mut changes =
             Self { mosaic, model, all: Vec::new(), first: first.len(), second: first.len() + second.len() };
-        let change =
-            |shade: &Shade| Change { shade: *shade, bytes: shade.length(), errors: changes.errors(*shade) };
+        let change = |shade: &TerminalColor| ColorChange {
+            shade: *shade,
+            bytes: shade.length(),
+            errors: changes.errors(*shade),
+        };
         changes.all = first.iter().chain(second).chain(both).map(change).collect();
         changes
     }
 
-    /// The errors of a colour in both parts, each as large as it is.
-    fn errors(&self, shade: Shade) -> [f32; 2] {
+    /// The errors of a color in both parts, each as large as it is.
+    fn errors(&self, shade: TerminalColor) -> [f32; 2] {
         let sizes = self.mosaic.tile.sizes();
         std::array::from_fn(|part| {
             let share = 2.0 * sizes[part] as f32 / PLACES as f32;
@@ -215,15 +218,15 @@ impl Changes {
         })
     }
 
-    /// The ways to draw the cell at the end of a way to it, with the pen as it is or with one other colour. A colour for
+    /// The ways to draw the cell at the end of a way to it, with the pen as it is or with one other color. A color for
     /// one part is shown in that one.
-    fn turn_one(&self, parent: usize, way: &Way, beam: &mut Beam) {
-        let mut ends = End::new(self, parent, way, beam);
+    fn turn_one(&self, parent: usize, way: &DrawPath, beam: &mut Beam) {
+        let mut ends = PathEnd::new(self, parent, way, beam);
         if !ends.is_near() {
             return;
         }
         let (fg_errors, bg_errors) = (self.errors(way.fg), self.errors(way.bg));
-        let pen = Ends { fg: way.fg, fg_errors, bg: way.bg, bg_errors };
+        let pen = PenErrors { fg: way.fg, fg_errors, bg: way.bg, bg_errors };
         for glyph in Glyph::ALL {
             ends.add(pen, 0, glyph);
         }
@@ -234,24 +237,24 @@ impl Changes {
                 _ if index < self.second => (Glyph::Second, Glyph::First),
                 _ => (Glyph::Full, Glyph::Blank),
             };
-            if change.shade.fits(Layer::Foreground) {
+            if change.shade.fits(ColorLayer::Foreground) {
                 ends.add(pen.with_fg(change), bytes, as_fg);
             }
-            if change.shade.fits(Layer::Background) {
+            if change.shade.fits(ColorLayer::Background) {
                 ends.add(pen.with_bg(change), bytes, as_bg);
             }
         }
     }
 
-    /// The same with both colours.
-    fn turn_both(&self, parent: usize, way: &Way, beam: &mut Beam) {
-        let mut ends = End::new(self, parent, way, beam);
+    /// The same with both colors.
+    fn turn_both(&self, parent: usize, way: &DrawPath, beam: &mut Beam) {
+        let mut ends = PathEnd::new(self, parent, way, beam);
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
                 for (fg, bg, glyph) in [(first, second, Glyph::First), (second, first, Glyph::Second)] {
-                    if fg.shade.fits(Layer::Foreground) && bg.shade.fits(Layer::Background) {
-                        ends.add(Ends::of(fg, bg), bytes, glyph);
+                    if fg.shade.fits(ColorLayer::Foreground) && bg.shade.fits(ColorLayer::Background) {
+                        ends.add(PenErrors::of(fg, bg), bytes, glyph);
                     }
                 }
             }
@@ -260,7 +263,7 @@ impl Changes {
 }
 
 /// Ways on from the end of one.
-struct End<'a> {
+struct PathEnd<'a> {
     parent: usize,
     /// With those that lead to the cell.
     bytes: u32,
@@ -274,8 +277,8 @@ struct End<'a> {
     bound: f32,
 }
 
-impl<'a> End<'a> {
-    fn new(changes: &Changes, parent: usize, way: &Way, beam: &'a mut Beam) -> Self {
+impl<'a> PathEnd<'a> {
+    fn new(changes: &ColorChanges, parent: usize, way: &DrawPath, beam: &'a mut Beam) -> Self {
         let byte = changes.model.byte;
         let error = way.cost - way.bytes as f32 * byte;
         let bound = beam.bound();
@@ -288,7 +291,7 @@ impl<'a> End<'a> {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
 
-    fn add(&mut self, ends: Ends, sgr: u32, glyph: Glyph) {
+    fn add(&mut self, ends: PenErrors, sgr: u32, glyph: Glyph) {
         // Turned round, half of each is another pattern by the same character.
         if glyph == Glyph::Second && self.tile == Tile::MEDIUM {
             return;
@@ -296,48 +299,48 @@ impl<'a> End<'a> {
         let bytes = self.bytes + sgr + glyph.symbol(self.tile).len_utf8() as u32;
         let cost = bytes as f32 * self.byte + self.error + ends.error(glyph);
         if cost < self.bound {
-            let Ends { fg, bg, .. } = ends;
+            let PenErrors { fg, bg, .. } = ends;
             let parent = self.parent;
-            let (pen, gap, glyph) = (pen(fg, bg), Gap::Cells(0), Some(glyph));
-            self.beam.add(Way { fg, bg, pen, gap, bytes, cost, parent, glyph });
+            let (pen, gap, glyph) = (pen(fg, bg), CursorGap::Cells(0), Some(glyph));
+            self.beam.add(DrawPath { fg, bg, pen, gap, bytes, cost, parent, glyph });
             self.bound = self.beam.bound();
         }
     }
 }
 
-/// A pen, and the errors of its colours in the parts of a cell.
+/// A pen, and the errors of its colors in the parts of a cell.
 #[derive(Clone, Copy)]
-struct Ends {
-    fg: Shade,
+struct PenErrors {
+    fg: TerminalColor,
     fg_errors: [f32; 2],
-    bg: Shade,
+    bg: TerminalColor,
     bg_errors: [f32; 2],
 }
 
-impl Ends {
-    fn of(fg: &Change, bg: &Change) -> Self {
+impl PenErrors {
+    fn of(fg: &ColorChange, bg: &ColorChange) -> Self {
         Self { fg: fg.shade, fg_errors: fg.errors, bg: bg.shade, bg_errors: bg.errors }
     }
 
-    fn with_fg(self, change: &Change) -> Self {
+    fn with_fg(self, change: &ColorChange) -> Self {
         Self { fg: change.shade, fg_errors: change.errors, ..self }
     }
 
-    fn with_bg(self, change: &Change) -> Self {
+    fn with_bg(self, change: &ColorChange) -> Self {
         Self { bg: change.shade, bg_errors: change.errors, ..self }
     }
 
     fn error(&self, glyph: Glyph) -> f32 {
         let of = |part: usize| match glyph.layers()[part] {
-            Layer::Foreground => self.fg_errors[part],
-            Layer::Background => self.bg_errors[part],
+            ColorLayer::Foreground => self.fg_errors[part],
+            ColorLayer::Background => self.bg_errors[part],
         };
         of(0) + of(1)
     }
 }
 
 /// The cheapest way back from the last cell.
-fn trace(ways: &[Vec<Way>], wanted: &[Option<Mosaic>]) -> Row {
+fn trace(ways: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow {
     let last = ways.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
     let (mut index, bytes) = best.map_or((0, 0), |(index, way)| (index, way.bytes));
@@ -346,15 +349,15 @@ fn trace(ways: &[Vec<Way>], wanted: &[Option<Mosaic>]) -> Row {
         let Some(way) = ways.get(index) else { break };
         if let (Some(glyph), Some(mosaic)) = (way.glyph, wanted[column - 1]) {
             let pair = glyph.layers().map(|layer| match layer {
-                Layer::Foreground => way.fg,
-                Layer::Background => way.bg,
+                ColorLayer::Foreground => way.fg,
+                ColorLayer::Background => way.bg,
             });
-            dabs.push(Dab { column: column - 1, glyph, mosaic: Mosaic::new(mosaic.tile, pair) });
+            dabs.push(DrawOp { column: column - 1, glyph, mosaic: Mosaic::new(mosaic.tile, pair) });
         }
         index = way.parent;
     }
     dabs.reverse();
-    Row { dabs, bytes }
+    PlannedRow { dabs, bytes }
 }
 
 #[cfg(test)]
@@ -364,28 +367,28 @@ mod tests {
     use super::*;
     use crate::mosaic::of_symbol;
 
-    const BLACK: Shade = Shade::Rgb([0, 0, 0]);
-    const RED: Shade = Shade::Rgb([200, 0, 0]);
+    const BLACK: TerminalColor = TerminalColor::Rgb([0, 0, 0]);
+    const RED: TerminalColor = TerminalColor::Rgb([200, 0, 0]);
 
-    fn wanted(halves: &[[Shade; 2]]) -> Vec<Target> {
+    fn wanted(halves: &[[TerminalColor; 2]]) -> Vec<TargetCell> {
         halves
             .iter()
-            .map(|halves| Target {
+            .map(|halves| TargetCell {
                 wanted: Some(Mosaic::halves(*halves)),
-                shown: Some(Mosaic::plain(Shade::Ground)),
+                shown: Some(Mosaic::plain(TerminalColor::Ground)),
             })
             .collect()
     }
 
-    fn start(fg: Shade, bg: Shade) -> Start {
-        Start { fg, bg, is_there: true }
+    fn start(fg: TerminalColor, bg: TerminalColor) -> RowStart {
+        RowStart { fg, bg, is_there: true }
     }
 
     #[test]
     fn the_pen_is_turned_once_and_blanks_are_preferred() {
         let found = row(
             &wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]),
-            start(BLACK, Shade::Ground),
+            start(BLACK, TerminalColor::Ground),
             CostModel::EXACT,
         );
         let glyphs: Vec<Glyph> = found.dabs.iter().map(|dab| dab.glyph).collect();
@@ -398,7 +401,7 @@ mod tests {
     fn what_is_shown_is_left_and_jumped_over() {
         let mut targets = wanted(&[[RED, BLACK]; 9]);
         for target in &mut targets[1..8] {
-            target.shown = Some(Mosaic::halves([RED, Shade::Rgb([1, 1, 1])]));
+            target.shown = Some(Mosaic::halves([RED, TerminalColor::Rgb([1, 1, 1])]));
         }
         let found = row(&targets, start(RED, BLACK), CostModel::EXACT);
         let columns: Vec<usize> = found.dabs.iter().map(|dab| dab.column).collect();
@@ -409,22 +412,25 @@ mod tests {
     }
 
     #[test]
-    fn colours_that_only_one_layer_has_are_shown_by_it() {
-        for halves in
-            [[RED, Shade::Ground], [Shade::Ground, RED], [Shade::Ink, Shade::Ground], [Shade::Ink; 2]]
-        {
-            let targets = [Target { wanted: Some(Mosaic::halves(halves)), shown: None }];
+    fn colors_that_only_one_layer_has_are_shown_by_it() {
+        for halves in [
+            [RED, TerminalColor::Ground],
+            [TerminalColor::Ground, RED],
+            [TerminalColor::Ink, TerminalColor::Ground],
+            [TerminalColor::Ink; 2],
+        ] {
+            let targets = [TargetCell { wanted: Some(Mosaic::halves(halves)), shown: None }];
             let found = row(&targets, start(BLACK, BLACK), CostModel::MOVING);
             assert_eq!(found.dabs.first().map(|dab| dab.mosaic.pair), Some(halves));
         }
     }
 
-    fn shade() -> impl Strategy<Value = Shade> {
+    fn shade() -> impl Strategy<Value = TerminalColor> {
         prop_oneof![
-            4 => (0..4_u8, 0..4_u8).prop_map(|(r, g)| Shade::Rgb([98 + r, 8 + g, 250])),
-            2 => any::<[u8; 3]>().prop_map(Shade::Rgb),
-            1 => any::<u8>().prop_map(Shade::Palette),
-            1 => Just(Shade::Ground),
+            4 => (0..4_u8, 0..4_u8).prop_map(|(r, g)| TerminalColor::Rgb([98 + r, 8 + g, 250])),
+            2 => any::<[u8; 3]>().prop_map(TerminalColor::Rgb),
+            1 => any::<u8>().prop_map(TerminalColor::Palette),
+            1 => Just(TerminalColor::Ground),
         ]
     }
 
@@ -436,7 +442,7 @@ mod tests {
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
             // As it is read from a character: its first part is in the foreground.
-            let is_cell = tile != Tile::MEDIUM || pair[0] != Shade::Ground;
+            let is_cell = tile != Tile::MEDIUM || pair[0] != TerminalColor::Ground;
             Mosaic::new(if is_cell { tile } else { Tile::HALVES }, pair)
         })
     }
@@ -450,9 +456,9 @@ mod tests {
             ),
             is_exact in any::<bool>(),
         ) {
-            let targets: Vec<Target> = cells.iter().map(|(wanted, shown)| Target { wanted: *wanted, shown: *shown }).collect();
+            let targets: Vec<TargetCell> = cells.iter().map(|(wanted, shown)| TargetCell { wanted: *wanted, shown: *shown }).collect();
             let model = if is_exact { CostModel::EXACT } else { CostModel::MOVING };
-            let found = row(&targets, start(Shade::Ink, Shade::Ground), model);
+            let found = row(&targets, start(TerminalColor::Ink, TerminalColor::Ground), model);
             let mut screen: Vec<Option<Mosaic>> = targets.iter().map(|target| target.shown).collect();
             for dab in &found.dabs {
                 prop_assert!(targets[dab.column].wanted.is_some(), "a cell of another's");

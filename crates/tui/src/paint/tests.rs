@@ -5,21 +5,21 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
-use super::look::Look;
-use super::shade::Shade;
-use super::wanted::looks;
+use super::cell::CellContent;
+use super::target_screen::looks;
+use super::terminal_color::TerminalColor;
 use super::*;
 
 mod pictures;
 
 /// A terminal with a painter in front of it.
-struct Desk {
+struct TestTerminal {
     painter: Painter,
     terminal: vt100::Parser,
     sent: usize,
 }
 
-impl Desk {
+impl TestTerminal {
     fn new(columns: u16, rows: u16, depth: ColorDepth) -> Self {
         Self::repeating(columns, rows, depth, false)
     }
@@ -47,7 +47,7 @@ impl Desk {
         self.sent - before
     }
 
-    /// The largest difference of a channel between the screen and a buffer; panics where more than colours of
+    /// The largest difference of a channel between the screen and a buffer; panics where more than colors of
     /// the picture differs.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
@@ -56,7 +56,7 @@ impl Desk {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
             match (look, shown(cell)) {
-                (Look::Mosaic(a), Look::Mosaic(b)) => {
+                (CellContent::Mosaic(a), CellContent::Mosaic(b)) => {
                     for (a, b, _) in a.against(b) {
                         largest =
                             largest.max(distance(a, b).unwrap_or_else(|| panic!("{x},{y}: {a:?} {b:?}")));
@@ -70,7 +70,7 @@ impl Desk {
 }
 
 /// None: they cannot be compared.
-fn distance(a: Shade, b: Shade) -> Option<u32> {
+fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     if a == b {
         return Some(0);
     }
@@ -79,9 +79,9 @@ fn distance(a: Shade, b: Shade) -> Option<u32> {
 }
 
 /// Look of a terminal's cell. Its parser knows fewer modifiers.
-fn shown(cell: &vt100::Cell) -> Look {
+fn shown(cell: &vt100::Cell) -> CellContent {
     if cell.is_wide_continuation() {
-        return Look::Covered;
+        return CellContent::Covered;
     }
     let mut as_buffer = ratatui::buffer::Cell::default();
     let color = |color| match color {
@@ -100,16 +100,16 @@ fn shown(cell: &vt100::Cell) -> Look {
     ] {
         as_buffer.modifier.set(modifier, is_on);
     }
-    Look::of(&as_buffer, ColorDepth::TrueColor)
+    CellContent::of(&as_buffer, ColorDepth::TrueColor)
 }
 
 const COLUMNS: u16 = 24;
 const ROWS: u16 = 8;
 const PICTURE: Rect = Rect { x: 3, y: 1, width: 17, height: 6 };
 
-/// One cell: a symbol, colours, modifiers.
+/// One cell: a symbol, colors, modifiers.
 #[derive(Clone, Debug)]
-struct Ink {
+struct CellStyle {
     symbol: &'static str,
     fg: Color,
     bg: Color,
@@ -123,12 +123,12 @@ fn color() -> impl Strategy<Value = Color> {
         Just(Color::White),
         (0..=255_u8).prop_map(Color::Indexed),
         any::<[u8; 3]>().prop_map(|[r, g, b]| Color::Rgb(r, g, b)),
-        // Few colours close to each other.
+        // Few colors close to each other.
         (0..3_u8, 0..3_u8).prop_map(|(r, g)| Color::Rgb(98 + r, 8 + g, 250)),
     ]
 }
 
-fn ink() -> impl Strategy<Value = Ink> {
+fn ink() -> impl Strategy<Value = CellStyle> {
     let symbol = prop_oneof![
         4 => Just("▀"),
         2 => Just(" "),
@@ -143,7 +143,7 @@ fn ink() -> impl Strategy<Value = Ink> {
             Modifier::REVERSED | Modifier::BOLD,
         ]),
     ];
-    (symbol, color(), color(), modifier).prop_map(|(symbol, fg, bg, modifier)| Ink {
+    (symbol, color(), color(), modifier).prop_map(|(symbol, fg, bg, modifier)| CellStyle {
         symbol,
         fg,
         bg,
@@ -153,7 +153,7 @@ fn ink() -> impl Strategy<Value = Ink> {
 
 fn buffer() -> impl Strategy<Value = Buffer> {
     let cells = usize::from(COLUMNS) * usize::from(ROWS);
-    // Cells of few kinds, so that neighbours are often the same.
+    // Cells of few kinds, so that neighbors are often the same.
     (proptest::collection::vec(ink(), 1..12), proptest::collection::vec(any::<u8>(), cells)).prop_map(
         |(inks, choice)| {
             let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
@@ -182,20 +182,20 @@ fn fidelity() -> impl Strategy<Value = Fidelity> {
 
 /// Something that happens to a painter.
 #[derive(Clone, Debug)]
-enum Step {
+enum PainterStep {
     Aim(Buffer, Fidelity),
-    Slice(usize),
+    OutputSlice(usize),
     Forget,
     /// Another program writes on the screen, and the painter hears of it.
     Litter,
 }
 
-fn step() -> impl Strategy<Value = Step> {
+fn step() -> impl Strategy<Value = PainterStep> {
     prop_oneof![
-        3 => (buffer(), fidelity()).prop_map(|(buffer, fidelity)| Step::Aim(buffer, fidelity)),
-        4 => (0..600_usize).prop_map(Step::Slice),
-        1 => Just(Step::Forget),
-        1 => Just(Step::Litter),
+        3 => (buffer(), fidelity()).prop_map(|(buffer, fidelity)| PainterStep::Aim(buffer, fidelity)),
+        4 => (0..600_usize).prop_map(PainterStep::OutputSlice),
+        1 => Just(PainterStep::Forget),
+        1 => Just(PainterStep::Litter),
     ]
 }
 
@@ -208,49 +208,49 @@ proptest! {
         depth in depth(),
         can_repeat in any::<bool>(),
     ) {
-        let mut desk = Desk::repeating(COLUMNS, ROWS, depth, can_repeat);
+        let mut ui = TestTerminal::repeating(COLUMNS, ROWS, depth, can_repeat);
         for step in steps {
             match step {
-                Step::Aim(buffer, fidelity) => desk.painter.aim(&buffer, PICTURE, fidelity),
-                Step::Slice(most_bytes) => {
-                    desk.slice(most_bytes);
+                PainterStep::Aim(buffer, fidelity) => ui.painter.aim(&buffer, PICTURE, fidelity),
+                PainterStep::OutputSlice(most_bytes) => {
+                    ui.slice(most_bytes);
                 }
-                Step::Forget => desk.painter.forget(),
-                Step::Litter => {
-                    desk.terminal.process(b"\x1b[7;31;44mshell$ \x1b[5;5Hx\n\n\n\n\n\n\n");
-                    desk.painter.forget();
+                PainterStep::Forget => ui.painter.forget(),
+                PainterStep::Litter => {
+                    ui.terminal.process(b"\x1b[7;31;44mshell$ \x1b[5;5Hx\n\n\n\n\n\n\n");
+                    ui.painter.forget();
                 }
             }
         }
-        desk.painter.aim(&last, PICTURE, Fidelity::Still);
-        desk.finish(most_bytes);
-        let largest = desk.difference(&last, depth);
+        ui.painter.aim(&last, PICTURE, Fidelity::Still);
+        ui.finish(most_bytes);
+        let largest = ui.difference(&last, depth);
         prop_assert!(largest <= 1, "{largest}");
-        desk.painter.aim(&last, PICTURE, Fidelity::Still);
-        prop_assert_eq!(desk.finish(most_bytes), 0, "nothing is sent for what is shown");
+        ui.painter.aim(&last, PICTURE, Fidelity::Still);
+        prop_assert_eq!(ui.finish(most_bytes), 0, "nothing is sent for what is shown");
     }
 
     #[test]
     fn words_are_exact_at_every_fidelity(buffers in proptest::collection::vec((buffer(), fidelity()), 1..5), depth in depth()) {
-        let mut desk = Desk::new(COLUMNS, ROWS, depth);
+        let mut ui = TestTerminal::new(COLUMNS, ROWS, depth);
         for (buffer, fidelity) in buffers {
-            desk.painter.aim(&buffer, Rect::ZERO, fidelity);
-            desk.finish(100);
-            prop_assert_eq!(desk.difference(&buffer, depth), 0);
+            ui.painter.aim(&buffer, Rect::ZERO, fidelity);
+            ui.finish(100);
+            prop_assert_eq!(ui.difference(&buffer, depth), 0);
         }
     }
 }
 
 #[test]
 fn another_size_is_a_new_screen() {
-    let mut desk = Desk::new(COLUMNS, ROWS, ColorDepth::TrueColor);
+    let mut ui = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
     for (columns, rows) in [(COLUMNS, ROWS), (10, 3), (24, 6), (1, 1)] {
         let area = Rect::new(0, 0, columns, rows);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, "words", ratatui::style::Style::new());
-        desk.painter.aim(&buffer, area, Fidelity::Still);
-        desk.finish(1000);
-        assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
+        ui.painter.aim(&buffer, area, Fidelity::Still);
+        ui.finish(1000);
+        assert_eq!(ui.difference(&buffer, ColorDepth::TrueColor), 0);
     }
 }
 
@@ -269,14 +269,15 @@ fn words_come_before_the_picture_and_the_picture_from_its_middle() {
     }
     buffer.set_string(0, 8, "words", ratatui::style::Style::new());
     buffer.set_string(5, 3, "over_it", ratatui::style::Style::reset());
-    let mut desk = Desk::new(30, 9, ColorDepth::TrueColor);
-    desk.painter.aim(&buffer, picture, Fidelity::Still);
-    desk.slice(100);
-    let row = |desk: &Desk, y: u16| desk.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
-    assert_eq!((row(&desk, 8), row(&desk, 3)), ("words".to_owned(), "     over_it".to_owned()));
+    let mut ui = TestTerminal::new(30, 9, ColorDepth::TrueColor);
+    ui.painter.aim(&buffer, picture, Fidelity::Still);
+    ui.slice(100);
+    let row =
+        |ui: &TestTerminal, y: u16| ui.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
+    assert_eq!((row(&ui, 8), row(&ui, 3)), ("words".to_owned(), "     over_it".to_owned()));
     let mut order = Vec::new();
-    while desk.slice(100) {
-        let is_drawn = |y: &u16| row(&desk, *y).ends_with('▀');
+    while ui.slice(100) {
+        let is_drawn = |y: &u16| row(&ui, *y).ends_with('▀');
         let new: Vec<u16> = (1..8).filter(is_drawn).filter(|y| !order.contains(y)).collect();
         order.extend(new);
     }
@@ -299,18 +300,18 @@ fn a_ramp_of_characters_comes_after_the_words_from_its_middle() {
         buffer.set_string(0, y, "  ..::--==++**##%%@@", ratatui::style::Style::new());
     }
     buffer.set_string(0, 5, "words", ratatui::style::Style::new());
-    let mut desk = Desk::new(20, 6, ColorDepth::None);
-    desk.painter.aim(&buffer, picture, Fidelity::Moving);
+    let mut ui = TestTerminal::new(20, 6, ColorDepth::None);
+    ui.painter.aim(&buffer, picture, Fidelity::Moving);
     let mut order = Vec::new();
-    while desk.slice(24) {
-        let rows: Vec<String> = desk.terminal.screen().rows(0, 20).collect();
+    while ui.slice(24) {
+        let rows: Vec<String> = ui.terminal.screen().rows(0, 20).collect();
         let full = |y: &usize| rows[*y].ends_with('@') || rows[*y] == "words";
         let new: Vec<usize> = (0..6).filter(full).filter(|y| !order.contains(y)).collect();
         order.extend(new);
     }
     assert_eq!(order, [5, 2, 3, 1, 4, 0]);
-    assert_eq!(desk.difference(&buffer, ColorDepth::None), 0);
-    assert!(desk.sent < 160, "{} bytes for 105 characters", desk.sent);
+    assert_eq!(ui.difference(&buffer, ColorDepth::None), 0);
+    assert!(ui.sent < 160, "{} bytes for 105 characters", ui.sent);
 }
 
 #[test]
@@ -318,20 +319,20 @@ fn blanks_of_words_are_erased_in_one_go() {
     let area = Rect::new(0, 0, 60, 1);
     let mut full = Buffer::empty(area);
     full.set_string(0, 0, "x".repeat(60), ratatui::style::Style::new());
-    let mut desk = Desk::new(60, 1, ColorDepth::TrueColor);
+    let mut ui = TestTerminal::new(60, 1, ColorDepth::TrueColor);
     for (text, most) in [("x".repeat(20), 12), (format!("{}{}x", "x".repeat(20), " ".repeat(39)), 16)] {
-        desk.painter.aim(&full, Rect::ZERO, Fidelity::Still);
-        desk.finish(100);
+        ui.painter.aim(&full, Rect::ZERO, Fidelity::Still);
+        ui.finish(100);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, &text, ratatui::style::Style::new());
-        desk.painter.aim(&buffer, Rect::ZERO, Fidelity::Still);
-        let sent = desk.finish(100);
+        ui.painter.aim(&buffer, Rect::ZERO, Fidelity::Still);
+        let sent = ui.finish(100);
         assert!(sent <= most, "{sent} bytes for {text:?}");
-        assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
+        assert_eq!(ui.difference(&buffer, ColorDepth::TrueColor), 0);
     }
 }
 
-/// A buffer with a picture in which each cell has its own colours, and words around it.
+/// A buffer with a picture in which each cell has its own colors, and words around it.
 fn with_words() -> Buffer {
     let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
     for place in PICTURE.positions() {
@@ -347,21 +348,21 @@ fn with_words() -> Buffer {
 fn words_that_wait_come_after_the_picture() {
     let buffer = with_words();
     let later = Rect { x: 0, y: 7, width: COLUMNS, height: 1 };
-    for besides in [Besides { later, ..Besides::default() }, Besides::default()] {
-        let mut desk = Desk::new(COLUMNS, ROWS, ColorDepth::TrueColor);
-        desk.painter.aim_with(&buffer, PICTURE, Fidelity::Still, &besides);
+    for besides in [FrameExtras { later, ..FrameExtras::default() }, FrameExtras::default()] {
+        let mut ui = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
+        ui.painter.aim_with(&buffer, PICTURE, Fidelity::Still, &besides);
         let mut cells_before = None;
-        while desk.slice(60) {
-            let text = desk.terminal.screen().contents();
+        while ui.slice(60) {
+            let text = ui.terminal.screen().contents();
             let is_drawn = |place: &ratatui::layout::Position| {
-                let cell = desk.terminal.screen().cell(place.y, place.x).expect("a cell");
+                let cell = ui.terminal.screen().cell(place.y, place.x).expect("a cell");
                 cell.bgcolor() != vt100::Color::Default || cell.fgcolor() != vt100::Color::Default
             };
             if text.contains("later") && cells_before.is_none() {
                 cells_before = Some(PICTURE.positions().filter(is_drawn).count() as u32);
             }
         }
-        assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
+        assert_eq!(ui.difference(&buffer, ColorDepth::TrueColor), 0);
         let expected = if besides.later.is_empty() { 0 } else { PICTURE.area() };
         assert_eq!(cells_before, Some(expected), "{besides:?}");
     }
@@ -370,12 +371,15 @@ fn words_that_wait_come_after_the_picture() {
 #[test]
 fn a_link_is_on_its_cells_alone_and_is_closed() {
     let buffer = with_words();
-    let link = |address: &str| Besides {
-        links: vec![Link { cells: Rect { x: 4, y: 0, width: 5, height: 1 }, address: address.to_owned() }],
-        ..Besides::default()
+    let link = |address: &str| FrameExtras {
+        links: vec![Hyperlink {
+            cells: Rect { x: 4, y: 0, width: 5, height: 1 },
+            address: address.to_owned(),
+        }],
+        ..FrameExtras::default()
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
-    let mut sent = |besides: &Besides| {
+    let mut sent = |besides: &FrameExtras| {
         painter.aim_with(&buffer, PICTURE, Fidelity::Still, besides);
         let mut bytes = Vec::new();
         loop {
@@ -400,6 +404,6 @@ fn a_link_is_on_its_cells_alone_and_is_closed() {
         other.contains("file:///b\u{1b}\\") && other.contains("there") && !other.contains("now"),
         "{other:?}"
     );
-    let none = sent(&Besides::default());
+    let none = sent(&FrameExtras::default());
     assert!(none.contains("there") && !none.contains("file:"), "{none:?}");
 }

@@ -1,9 +1,9 @@
 //! Words: exactly as they are wanted.
 
-use super::look::{Glyph, Look};
-use super::moves::{self, Place};
-use super::screen::{Screen, Stroke};
-use super::wanted::{Region, Wanted};
+use super::cell::{CellContent, Glyph};
+use super::cursor_moves::{self, CellPosition};
+use super::screen::{ScreenModel, Stroke};
+use super::target_screen::{ScreenRegion, TargetScreen};
 
 /// From so many blanks on, they are erased in one go.
 const ERASED: usize = 9;
@@ -11,10 +11,10 @@ const ERASED: usize = 9;
 const ERASED_TO_END: usize = 4;
 
 /// Plans the strokes of the words of a region in a row, or of a picture made of characters.
-pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, region: Region) -> Vec<Stroke> {
+pub(super) fn plan(screen: &ScreenModel, wanted: &TargetScreen, y: u16, region: ScreenRegion) -> Vec<Stroke> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
-        let at = Place { x, y };
+        let at = CellPosition { x, y };
         let look = &wanted.row(y)[usize::from(x)];
         if screen.look(at) == look || wanted.region(x, y) != region {
             continue;
@@ -27,35 +27,39 @@ pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, region: Region) -> 
     erased(wanted, y, &strokes)
 }
 
-fn stroke(at: Place, look: &Look) -> Option<Stroke> {
+fn stroke(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     match look {
-        Look::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
-        Look::Mosaic(mosaic) => {
+        CellContent::Text(text) => Some(Stroke::Text { at, text: text.clone() }),
+        CellContent::Mosaic(mosaic) => {
             let glyph = Glyph::ALL.into_iter().find(|glyph| glyph.shows(mosaic.pair))?;
             Some(Stroke::Mosaic { at, glyph, mosaic: *mosaic, count: 1 })
         }
-        Look::Unknown | Look::Covered => None,
+        CellContent::Unknown | CellContent::Covered => None,
     }
 }
 
 /// Writes the cells between the last stroke and a place again, if that is shorter than a jump over them.
-fn bridge(screen: &Screen, strokes: &mut Vec<Stroke>, to: Place) {
+fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     let Some(Stroke::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;
-    let jump = moves::control(to.x - first, b'C').len();
+    let jump = cursor_moves::control(to.x - first, b'C').len();
     let (mut between, mut bytes) = (Vec::new(), 0);
     for x in first..to.x {
-        let at = Place { x, ..to };
+        let at = CellPosition { x, ..to };
         match screen.look(at) {
-            Look::Text(other) if other.pen == text.pen && other.is_plain() => {
+            CellContent::Text(other) if other.pen == text.pen && other.is_plain() => {
                 bytes += other.symbol.len();
                 between.push(Stroke::Text { at, text: other.clone() });
             }
-            Look::Mosaic(mosaic) if mosaic.pair == [text.pen.bg; 2] && text.pen.modifier.is_empty() => {
+            CellContent::Mosaic(mosaic)
+                if mosaic.pair == [text.pen.bg; 2] && text.pen.modifier.is_empty() =>
+            {
                 bytes += 1;
                 between.push(Stroke::Mosaic { at, glyph: Glyph::Blank, mosaic: *mosaic, count: 1 });
             }
-            Look::Text(_) | Look::Mosaic(_) | Look::Unknown | Look::Covered => return,
+            CellContent::Text(_) | CellContent::Mosaic(_) | CellContent::Unknown | CellContent::Covered => {
+                return;
+            }
         }
         if bytes > jump {
             return;
@@ -65,14 +69,16 @@ fn bridge(screen: &Screen, strokes: &mut Vec<Stroke>, to: Place) {
 }
 
 /// The same with many blanks in a row erased in one go.
-fn erased(wanted: &Wanted, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
+fn erased(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
     let mut shorter = Vec::with_capacity(strokes.len());
     for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.at().x + 1 == b.at().x) {
         let at = run[0].at();
         let end = usize::from(at.x) + run.len();
         let rest = end as u16..wanted.columns;
         let is_last = rest.clone().all(|x| !wanted.is_picture(x, y))
-            && wanted.row(y)[end.min(usize::from(wanted.columns))..].iter().all(|look| *look == Look::BLANK);
+            && wanted.row(y)[end.min(usize::from(wanted.columns))..]
+                .iter()
+                .all(|look| *look == CellContent::BLANK);
         if is_blank(&run[0]) && is_last && run.len() >= ERASED_TO_END {
             shorter.push(Stroke::Erase { at, count: None });
         } else if is_blank(&run[0]) && run.len() >= ERASED {
@@ -85,5 +91,5 @@ fn erased(wanted: &Wanted, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
 }
 
 fn is_blank(stroke: &Stroke) -> bool {
-    matches!(stroke, Stroke::Mosaic { mosaic, count: 1, .. } if Look::Mosaic(*mosaic) == Look::BLANK)
+    matches!(stroke, Stroke::Mosaic { mosaic, count: 1, .. } if CellContent::Mosaic(*mosaic) == CellContent::BLANK)
 }

@@ -1,4 +1,4 @@
-//! The terminal: its window, its colours, and the means by which pictures are shown.
+//! The terminal: its window, its colors, and the means by which pictures are shown.
 
 use std::time::{Duration, Instant};
 
@@ -6,11 +6,11 @@ use super::Setup;
 use crate::color::{Ansi, ColorDepth, Shades};
 use crate::event::{FrameReport, Window};
 use crate::graphics::Protocol;
-use crate::known::Ask;
 use crate::mosaic::Grid;
-use crate::pixels::PixelRequest;
+use crate::pixel_request::PixelRequest;
 use crate::preview_kind::PreviewKind;
-use crate::terminals::Abilities;
+use crate::terminal_replies::TerminalQueries;
+use crate::terminals::Capabilities;
 
 /// The terminal as far as it is known.
 pub(crate) struct DisplayState {
@@ -18,12 +18,12 @@ pub(crate) struct DisplayState {
     pub kind: PreviewKind,
     pub depth: ColorDepth,
     pub shades: Shades,
-    /// The terminal's 16 colours.
+    /// The terminal's 16 colors.
     pub ansi: Ansi,
     /// Questions to the terminal.
-    pub ask: Ask,
+    pub ask: TerminalQueries,
     /// Abilities of the terminal besides text.
-    pub abilities: Abilities,
+    pub abilities: Capabilities,
     /// Time after which the end of a render is worth a notification. `None` for none.
     pub notify_after: Option<Duration>,
     /// Whether its window has the focus, as far as it says.
@@ -81,7 +81,7 @@ impl DisplayState {
         }
     }
 
-    /// Whether colours are mixed from those that the terminal has.
+    /// Whether colors are mixed from those that the terminal has.
     pub(crate) fn mixes_colors(&self) -> bool {
         matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
             || self.kind == PreviewKind::Pixels(Protocol::Sixel)

@@ -14,15 +14,15 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{Message, OverlayState, Pane, Problems, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles, signed_stops};
-pub(super) use self::saving::{OwnImage, PendingChange, SavingState, Written};
+pub(super) use self::request::{CameraStep, ImageOrigin, RequestState, Toggles, signed_stops};
+pub(super) use self::saving::{OwnImage, PendingChange, SavingState, WrittenFile};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};
 use super::color::{Ansi, ColorDepth};
 use super::event::Window;
-use super::known::Ask;
 use super::preview_kind::PreviewKind;
-use super::terminals::Abilities;
+use super::terminal_replies::TerminalQueries;
+use super::terminals::Capabilities;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
@@ -35,12 +35,12 @@ pub(super) struct Setup {
     pub depth: ColorDepth,
     /// Whether the environment says that the terminal's background is light.
     pub is_light: bool,
-    /// Likely values of the 16 colours.
+    /// Likely values of the 16 colors.
     pub ansi: Ansi,
     /// Questions to the terminal.
-    pub ask: Ask,
+    pub ask: TerminalQueries,
     /// Abilities of the terminal besides text, by the environment.
-    pub abilities: Abilities,
+    pub abilities: Capabilities,
     /// Time after which the end of a render is worth a notification. `None` for none.
     pub notify_after: Option<Duration>,
 }

@@ -1,12 +1,12 @@
 //! The picture on the screen, and the pictures before it.
 
-use crate::history::{History, Shown};
+use crate::history::{History, ShownImage};
 use crate::pipeline::protocol::Spot;
 
 /// The picture on the screen, and how it is looked at.
 #[derive(Default)]
 pub(crate) struct PictureState {
-    pub shown: Option<Shown>,
+    pub shown: Option<ShownImage>,
     pub history: History,
     /// Place around which the image is shown pixel by pixel. `None` if all of the image is shown.
     pub close_up: Option<Spot>,

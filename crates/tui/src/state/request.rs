@@ -88,7 +88,7 @@ fn listed(names: &[&str]) -> String {
 
 /// Scene and settings that a picture was made of.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Origin {
+pub(crate) struct ImageOrigin {
     /// Settings that keys had changed.
     pub toggles: Toggles,
     /// Text of the scene file. `None` for a model.
@@ -99,7 +99,7 @@ pub(crate) struct Origin {
     pub is_unfinished: bool,
 }
 
-impl Origin {
+impl ImageOrigin {
     /// The same in any exposure: of the same light.
     pub(crate) fn of_light(self) -> Self {
         Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
@@ -216,8 +216,8 @@ impl RequestState {
     }
 
     /// Description of what the newest request shows.
-    pub(crate) fn origin(&self, is_unfinished: bool) -> Origin {
-        Origin {
+    pub(crate) fn origin(&self, is_unfinished: bool) -> ImageOrigin {
+        ImageOrigin {
             toggles: self.sent_toggles,
             text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
             files: self.files.clone(),

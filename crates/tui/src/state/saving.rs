@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use super::request::Toggles;
-use crate::event::Unwritten;
+use crate::event::WriteFailure;
 use crate::options::Lost;
 use crate::pipeline::protocol::{CameraEdit, OwnState, Viewpoint};
 
@@ -25,7 +25,7 @@ pub(crate) struct OwnImage {
 
 /// A picture that was written.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Written {
+pub(crate) struct WrittenFile {
     pub path: PathBuf,
     pub bytes: u64,
     /// Number of the request.
@@ -77,8 +77,8 @@ pub(crate) struct SavingState {
     /// Why the current picture is not on disk, if it should be.
     pub unwritten: Option<String>,
     /// The last failure to write, until a later picture is on disk.
-    pub write_failed: Option<Unwritten>,
-    pub written: Vec<Written>,
+    pub write_failed: Option<WriteFailure>,
+    pub written: Vec<WrittenFile>,
 }
 
 impl SavingState {

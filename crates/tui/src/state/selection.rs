@@ -1,6 +1,6 @@
 //! The mouse, and the place of the picture that is picked.
 
-use crate::event::FilePlace;
+use crate::event::FilePosition;
 use crate::pipeline::protocol::Spot;
 
 /// A press of the left button on the picture.
@@ -40,7 +40,7 @@ pub(crate) struct SelectionState {
     /// Text of the last click, in one line.
     pub clicked: Option<String>,
     /// Place of the picked object in the scene file.
-    pub picked: Option<FilePlace>,
+    pub picked: Option<FilePosition>,
 }
 
 impl SelectionState {

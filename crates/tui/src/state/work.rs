@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::request::Origin;
+use super::request::ImageOrigin;
 use crate::noise_curve::NoiseCurve;
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
 
@@ -64,7 +64,7 @@ pub(crate) struct WorkState {
     /// The same of the last picture that was finished.
     pub last_curve: NoiseCurve,
     /// Curves of the last renders, the newest at the end: a picture that is found again has its curve.
-    curves: Vec<(Origin, NoiseCurve)>,
+    curves: Vec<(ImageOrigin, NoiseCurve)>,
     /// Whether the request changed nothing.
     pub unchanged: bool,
     /// Finished renders so far; another exposure is no render.
@@ -92,7 +92,7 @@ impl WorkState {
     }
 
     /// Keeps the curve of a finished render.
-    pub(crate) fn keep_curve(&mut self, origin: Origin) {
+    pub(crate) fn keep_curve(&mut self, origin: ImageOrigin) {
         const MOST: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
         self.curves.push((origin, self.curve.clone()));
@@ -102,7 +102,7 @@ impl WorkState {
     }
 
     /// Takes up the curve of a picture that is found again, if it is known.
-    pub(crate) fn find_curve(&mut self, origin: &Origin) {
+    pub(crate) fn find_curve(&mut self, origin: &ImageOrigin) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }

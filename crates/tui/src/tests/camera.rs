@@ -11,9 +11,9 @@ use crate::scene::diagnostic::Severity;
 use crate::{Changed, ColorDepth};
 use crossterm::event::KeyCode;
 
-fn show(desk: &mut Desk) -> Vec<crate::event::Effect> {
-    let generation = desk.state.request.generation;
-    desk.event(Event::Picture {
+fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
+    let generation = ui.state.request.generation;
+    ui.event(Event::Picture {
         generation,
         picture: plain_picture(50, 38, BLUE),
         range: None,
@@ -25,101 +25,101 @@ fn show(desk: &mut Desk) -> Vec<crate::event::Effect> {
 
 #[test]
 fn a_moved_camera_is_shown_and_not_written_until_it_goes_back() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    let effects = desk.press('l');
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    let effects = ui.press('l');
     let moved = request(&effects).expect("a request");
     assert_eq!((moved.write, moved.force), (Writing::No, false));
-    let text = desk.text();
+    let text = ui.text();
     assert!(text.contains("camera moved (preview only). w: save image"), "{text}");
     assert!(text.lines().last().is_some_and(|line| line.contains("0 reset camera")), "{text}");
-    show(&mut desk);
-    let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
+    show(&mut ui);
+    let effects = ui.event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
     assert_eq!(edited.overrides.camera, moved.overrides.camera, "a save does not move it back");
     assert_eq!(edited.write, Writing::No);
-    let effects = desk.press('0');
+    let effects = ui.press('0');
     let own = request(&effects).expect("a request");
     assert_eq!((own.write, own.overrides.camera.is_any()), (Writing::Try, false));
-    assert!(!desk.text().contains("camera moved"));
+    assert!(!ui.text().contains("camera moved"));
 }
 
 #[test]
 fn of_many_steps_the_newest_is_rendered_once_the_one_before_is_seen() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    let effects = desk.press('l');
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    let effects = ui.press('l');
     let first = request(&effects).expect("the first step at once").overrides.camera.pose.expect("a pose");
     for key in ['l', 'l', 'k', '<'] {
-        assert!(desk.press(key).is_empty(), "the first has no picture yet");
+        assert!(ui.press(key).is_empty(), "the first has no picture yet");
     }
-    let effects = show(&mut desk);
+    let effects = show(&mut ui);
     let newest = request(&effects).expect("the newest").overrides.camera;
     let pose = newest.pose.expect("a pose");
     assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
     assert!(newest.fov.is_some_and(|fov| fov < 40.0));
-    assert!(show(&mut desk).is_empty(), "nothing waits any more");
-    assert!(request(&desk.press('l')).is_some(), "and the next goes at once");
+    assert!(show(&mut ui).is_empty(), "nothing waits any more");
+    assert!(request(&ui.press('l')).is_some(), "and the next goes at once");
     // What is not a step goes at once, with all steps before it.
-    desk.press('l');
-    let effects = desk.press('s');
+    ui.press('l');
+    let effects = ui.press('s');
     assert!(request(&effects).expect("a request").overrides.camera != newest);
-    assert!(show(&mut desk).is_empty());
+    assert!(show(&mut ui).is_empty());
 }
 
 #[test]
 fn a_step_that_can_have_no_picture_holds_nothing_up() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.press('l');
-    desk.press('l');
-    let generation = desk.state.request.generation;
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.press('l');
+    ui.press('l');
+    let generation = ui.state.request.generation;
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
-    let effects = desk.worker(protocol::Event::Failed { generation, failure });
+    let effects = ui.worker(protocol::Event::Failed { generation, failure });
     assert!(request(&effects).is_none(), "the scene broke meanwhile: the last good one is rendered");
-    assert!(request(&show(&mut desk)).is_some(), "which is seen");
-    desk.press('l');
-    let generation = desk.state.request.generation;
+    assert!(request(&show(&mut ui)).is_some(), "which is seen");
+    ui.press('l');
+    let generation = ui.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
-    let effects = desk.worker(protocol::Event::Failed { generation, failure });
+    let effects = ui.worker(protocol::Event::Failed { generation, failure });
     assert!(request(&effects).is_some(), "the work failed: the step that waited goes");
-    let mut desk = Desk::with(state(80, 1));
-    desk.finish(RED);
+    let mut ui = TestUi::with(state(80, 1));
+    ui.finish(RED);
     for _ in 0..3 {
-        assert!(request(&desk.press('l')).is_some(), "there is no room for a picture");
+        assert!(request(&ui.press('l')).is_some(), "there is no room for a picture");
     }
 }
 
 #[test]
 fn the_arrows_scroll_the_errors_while_they_are_open() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
     let down = KeyPress::special(KeyCode::Down);
-    assert!(desk.key(down).is_empty());
-    assert!(desk.state.overlays.diagnostics.scroll > 0);
-    desk.key(KeyPress::special(KeyCode::Esc));
-    assert!(request(&desk.key(down)).is_some(), "closed, they move the camera");
+    assert!(ui.key(down).is_empty());
+    assert!(ui.state.overlays.diagnostics.scroll > 0);
+    ui.key(KeyPress::special(KeyCode::Esc));
+    assert!(request(&ui.key(down)).is_some(), "closed, they move the camera");
 }
 
 #[test]
 fn before_a_scene_is_read_there_is_no_camera_to_move() {
-    let mut desk = Desk::new();
-    assert!(desk.press('l').is_empty() && desk.press('>').is_empty() && desk.press(']').is_empty());
-    assert!(desk.text().contains("has not been read yet"));
+    let mut ui = TestUi::new();
+    assert!(ui.press('l').is_empty() && ui.press('>').is_empty() && ui.press(']').is_empty());
+    assert!(ui.text().contains("has not been read yet"));
 }
 
 #[test]
 fn exposure_starts_from_the_scene_s_own() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.state.request.exposure = Some(1.0);
-    desk.press(']');
-    show(&mut desk);
-    let effects = desk.press(']');
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.state.request.exposure = Some(1.0);
+    ui.press(']');
+    show(&mut ui);
+    let effects = ui.press(']');
     assert_eq!(request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
-    assert!(desk.text().contains("0 reset exposure (+1.5)"), "{}", desk.text());
+    assert!(ui.text().contains("0 reset exposure (+1.5)"), "{}", ui.text());
 }
 
 #[test]
@@ -132,19 +132,19 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
         ('[', "exposure −20"),
         (']', "exposure +20"),
     ] {
-        let mut desk = Desk::new();
-        desk.finish(RED);
+        let mut ui = TestUi::new();
+        ui.finish(RED);
         for _ in 0..400 {
-            desk.press(key);
-            show(&mut desk);
+            ui.press(key);
+            show(&mut ui);
         }
-        assert!(desk.text().contains(words), "{key}: {}", desk.text());
-        let generation = desk.state.request.generation;
+        assert!(ui.text().contains(words), "{key}: {}", ui.text());
+        let generation = ui.state.request.generation;
         assert!(
-            desk.press(key).is_empty() && desk.state.request.generation == generation,
+            ui.press(key).is_empty() && ui.state.request.generation == generation,
             "{key}: nothing is rendered"
         );
-        let view = desk.state.request.viewpoint().expect("a camera");
+        let view = ui.state.request.viewpoint().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
 }
@@ -152,13 +152,13 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
 #[test]
 fn what_is_back_where_the_scene_has_it_is_no_change() {
     for keys in ["[]", "][", "<>", "><", "+-", "-+", "lh", "]]]]["] {
-        let mut desk = Desk::new();
-        desk.finish(RED);
+        let mut ui = TestUi::new();
+        ui.finish(RED);
         let mut last = None;
         for key in keys.chars() {
-            let effects = desk.press(key);
+            let effects = ui.press(key);
             last = request(&effects).cloned();
-            show(&mut desk);
+            show(&mut ui);
         }
         let last = last.expect("a request");
         let is_back = keys != "]]]][";
@@ -167,70 +167,67 @@ fn what_is_back_where_the_scene_has_it_is_no_change() {
             (last.write, last.own.is_none()),
             if is_back { (Writing::Try, true) } else { (Writing::No, false) }
         );
-        let line = desk.text().lines().last().map(str::to_owned).unwrap_or_default();
+        let line = ui.text().lines().last().map(str::to_owned).unwrap_or_default();
         assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");
-        assert!(!desk.text().contains("camera moved"), "{keys}: {}", desk.text());
+        assert!(!ui.text().contains("camera moved"), "{keys}: {}", ui.text());
     }
 }
 
 #[test]
 fn the_call_s_own_exposure_is_no_change_either() {
     let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
-    let mut desk = Desk::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
-    desk.finish(RED);
-    desk.press('[');
-    show(&mut desk);
-    desk.press(']');
-    assert_eq!(
-        (desk.state.request.toggles.exposure, desk.state.request.overrides().exposure),
-        (None, Some(1.0))
-    );
+    let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
+    ui.finish(RED);
+    ui.press('[');
+    show(&mut ui);
+    ui.press(']');
+    assert_eq!((ui.state.request.toggles.exposure, ui.state.request.overrides().exposure), (None, Some(1.0)));
 }
 
 #[test]
 fn the_scene_of_a_model_is_written_once_and_its_camera_is_kept() {
     use crate::pipeline::protocol::{Event as WorkerEvent, Kept};
-    let mut desk = Desk::new();
-    desk.state.request.scene = "assets/vase.obj".into();
-    desk.finish([200, 30, 30]);
-    desk.press('l');
-    desk.finish([30, 30, 200]);
-    desk.key(KeyPress::special(KeyCode::Esc));
-    assert!(desk.text().contains("c keep") && !desk.text().contains("o edit"), "{}", desk.text());
+    let mut ui = TestUi::new();
+    ui.state.request.scene = "assets/vase.obj".into();
+    ui.finish([200, 30, 30]);
+    ui.press('l');
+    ui.finish([30, 30, 200]);
+    ui.key(KeyPress::special(KeyCode::Esc));
+    assert!(ui.text().contains("c keep") && !ui.text().contains("o edit"), "{}", ui.text());
     let kept =
         Kept { path: "assets/vase.toml".into(), is_new: true, is_own: false, of_model: true, edit: None };
-    let generation = desk.state.request.generation;
-    desk.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
-    desk.key(KeyPress::special(KeyCode::Esc));
-    assert!(!desk.text().contains("c keep"), "there is a scene already: {}", desk.text());
-    assert_eq!(crate::exit_summary::not_kept(&desk.state), None);
-    desk.press('l');
-    desk.finish([200, 30, 30]);
-    assert!(crate::exit_summary::not_kept(&desk.state).is_some(), "it was moved since");
+    let generation = ui.state.request.generation;
+    ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
+    ui.key(KeyPress::special(KeyCode::Esc));
+    assert!(!ui.text().contains("c keep"), "there is a scene already: {}", ui.text());
+    assert_eq!(crate::exit_summary::not_kept(&ui.state), None);
+    ui.press('l');
+    ui.finish([200, 30, 30]);
+    assert!(crate::exit_summary::not_kept(&ui.state).is_some(), "it was moved since");
 }
 
 /// A save after which the scene has this camera.
-fn save(desk: &mut Desk, camera: Viewpoint) {
-    desk.event(Event::Changed(Changed { noticed: desk.now }));
-    let generation = desk.state.request.generation;
-    desk.worker(protocol::Event::Started { generation });
-    desk.worker(protocol::Event::Settings {
+fn save(ui: &mut TestUi, camera: Viewpoint) {
+    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    let generation = ui.state.request.generation;
+    ui.worker(protocol::Event::Started { generation });
+    ui.worker(protocol::Event::Settings {
         generation,
         settings: settings().into(),
         camera,
         exposure: 0.0,
         own: own(),
     });
-    show(desk);
+    show(ui);
 }
 
 /// The camera that `c` orders to be written. `None` if it orders nothing.
-fn kept(desk: &mut Desk) -> Option<Viewpoint> {
+fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
     let is_order = |effect: Effect| match effect {
         Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),
         _ => None,
     };
-    desk.press('c').into_iter().find_map(is_order)
+    ui.press('c').into_iter().find_map(is_order)
 }
 
 fn moved_to(position: [f64; 3]) -> Viewpoint {
@@ -250,79 +247,79 @@ fn what_was_saved_of_a_moved_camera_is_named_before_c_writes_over_it() {
         ("h<", both, "camera.position = [0, 2, 4], camera.fov = 25"),
         ("h<", wide(25.0), "camera.fov = 25"),
     ] {
-        let mut desk = Desk::with(state(160, 40));
-        desk.finish(RED);
+        let mut ui = TestUi::with(state(160, 40));
+        ui.finish(RED);
         for key in keys.chars() {
-            desk.press(key);
-            show(&mut desk);
+            ui.press(key);
+            show(&mut ui);
         }
-        let moved = desk.state.request.toggles.camera;
-        save(&mut desk, saved);
-        assert_eq!(kept(&mut desk), None, "{keys}");
+        let moved = ui.state.request.toggles.camera;
+        save(&mut ui, saved);
+        assert_eq!(kept(&mut ui), None, "{keys}");
         let said = format!(
             "error: {words} was saved since the keys moved the camera: press c again to write over it"
         );
-        assert!(desk.text().contains(&said), "{keys}: {}", desk.text());
-        assert_eq!(kept(&mut desk), Some(saved.changed(&moved)), "{keys}: the second time it is meant");
+        assert!(ui.text().contains(&said), "{keys}: {}", ui.text());
+        assert_eq!(kept(&mut ui), Some(saved.changed(&moved)), "{keys}: the second time it is meant");
     }
 }
 
 #[test]
 fn what_is_saved_after_that_is_named_again() {
-    let mut desk = Desk::with(state(160, 40));
-    desk.finish(RED);
-    desk.press('h');
-    show(&mut desk);
+    let mut ui = TestUi::with(state(160, 40));
+    ui.finish(RED);
+    ui.press('h');
+    show(&mut ui);
     for height in [2.0, 3.0] {
-        save(&mut desk, moved_to([0.0, height, 4.0]));
-        assert_eq!(kept(&mut desk), None);
-        assert!(desk.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", desk.text());
+        save(&mut ui, moved_to([0.0, height, 4.0]));
+        assert_eq!(kept(&mut ui), None);
+        assert!(ui.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", ui.text());
     }
     // Moved on, it is still the camera that is meant.
-    desk.press('h');
-    show(&mut desk);
-    assert!(kept(&mut desk).is_some());
+    ui.press('h');
+    show(&mut ui);
+    assert!(kept(&mut ui).is_some());
 }
 
 #[test]
 fn what_was_saved_beside_a_moved_camera_stays_when_c_writes() {
     let saved = Viewpoint { fov: 25.0, ..camera() };
-    let mut desk = Desk::with(state(160, 40));
-    desk.finish(RED);
-    desk.press('h');
-    show(&mut desk);
-    save(&mut desk, saved);
-    let moved = desk.state.request.toggles.camera;
-    assert_eq!(kept(&mut desk), Some(saved.changed(&moved)));
+    let mut ui = TestUi::with(state(160, 40));
+    ui.finish(RED);
+    ui.press('h');
+    show(&mut ui);
+    save(&mut ui, saved);
+    let moved = ui.state.request.toggles.camera;
+    assert_eq!(kept(&mut ui), Some(saved.changed(&moved)));
     // The plane in focus goes with what is looked at: it was not saved.
-    let mut desk = Desk::with(state(160, 40));
-    desk.finish(RED);
-    desk.state.request.toggles.camera.focus = Some(2.5);
-    desk.press('r');
-    save(&mut desk, moved_to([0.0, 1.0, 6.0]));
-    assert_eq!(kept(&mut desk).map(|camera| (camera.focus, camera.pose.position.z)), Some((2.5, 6.0)));
+    let mut ui = TestUi::with(state(160, 40));
+    ui.finish(RED);
+    ui.state.request.toggles.camera.focus = Some(2.5);
+    ui.press('r');
+    save(&mut ui, moved_to([0.0, 1.0, 6.0]));
+    assert_eq!(kept(&mut ui).map(|camera| (camera.focus, camera.pose.position.z)), Some((2.5, 6.0)));
 }
 
 #[test]
 fn keys_that_move_the_camera_from_a_saved_one_write_over_nothing_that_is_newer() {
-    let mut desk = Desk::with(state(160, 40));
-    desk.finish(RED);
-    desk.press('h');
-    show(&mut desk);
-    save(&mut desk, moved_to([0.0, 2.0, 4.0]));
-    desk.press('0');
-    desk.press('h');
-    assert!(kept(&mut desk).is_some());
+    let mut ui = TestUi::with(state(160, 40));
+    ui.finish(RED);
+    ui.press('h');
+    show(&mut ui);
+    save(&mut ui, moved_to([0.0, 2.0, 4.0]));
+    ui.press('0');
+    ui.press('h');
+    assert!(kept(&mut ui).is_some());
 }
 
 #[test]
 fn the_camera_of_a_model_is_saved_by_nobody() {
-    let mut desk = Desk::with(state(160, 40));
-    desk.state.request.scene = "assets/vase.obj".into();
-    desk.finish(RED);
-    desk.press('h');
-    show(&mut desk);
+    let mut ui = TestUi::with(state(160, 40));
+    ui.state.request.scene = "assets/vase.obj".into();
+    ui.finish(RED);
+    ui.press('h');
+    show(&mut ui);
     // The model has another size by now, and is framed anew.
-    save(&mut desk, moved_to([0.0, 2.0, 4.0]));
-    assert!(kept(&mut desk).is_some());
+    save(&mut ui, moved_to([0.0, 2.0, 4.0]));
+    assert!(kept(&mut ui).is_some());
 }

@@ -6,10 +6,10 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::super::display::{Display, Way};
+use super::super::display::{Display, TerminalLink};
 use super::super::graphics::{Images, PixelScreen, Protocol};
-use super::super::known::Answer;
 use super::super::presenter::Presenter;
+use super::super::terminal_replies::TerminalReply;
 use crate::color::{ColorDepth, in_xterm};
 use crate::event::Event;
 use crate::film::Picture;
@@ -30,22 +30,24 @@ const PROGRESS: Duration = Duration::from_millis(60);
 
 /// A line with a terminal at its end.
 #[derive(Clone, Copy)]
-struct Line {
+struct SimulatedConnection {
     bytes_per_second: f64,
     round_trip: Duration,
 }
 
-const QUICK: Line = Line { bytes_per_second: 2e7, round_trip: Duration::from_millis(1) };
+const QUICK: SimulatedConnection =
+    SimulatedConnection { bytes_per_second: 2e7, round_trip: Duration::from_millis(1) };
 /// 1 Mbit/s.
-const THIN: Line = Line { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
+const THIN: SimulatedConnection =
+    SimulatedConnection { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
 
 /// The terminal: what is on its screen, and its answers under way.
-struct Terminal {
-    line: Line,
+struct SimulatedTerminal {
+    line: SimulatedConnection,
     /// When the last byte leaves the line.
     free: Instant,
     arriving: VecDeque<(Instant, Vec<u8>)>,
-    answers: VecDeque<(Instant, Answer)>,
+    answers: VecDeque<(Instant, TerminalReply)>,
     cells: vt100::Parser,
     pixels: PixelScreen,
     /// Bytes that came, and their number.
@@ -56,8 +58,8 @@ struct Terminal {
     most_unanswered: usize,
 }
 
-impl Terminal {
-    fn new(line: Line, now: Instant) -> Self {
+impl SimulatedTerminal {
+    fn new(line: SimulatedConnection, now: Instant) -> Self {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         Self {
             line,
@@ -75,8 +77,9 @@ impl Terminal {
 
     /// A slice goes into the line. Each of them ends with a question.
     fn send(&mut self, bytes: Vec<u8>, now: Instant) {
-        let Line { bytes_per_second, round_trip } = self.line;
-        let answer = if bytes.ends_with(b"\x1b[c") { Answer::Attributes } else { Answer::Ready };
+        let SimulatedConnection { bytes_per_second, round_trip } = self.line;
+        let answer =
+            if bytes.ends_with(b"\x1b[c") { TerminalReply::Attributes } else { TerminalReply::Ready };
         self.free = self.free.max(now) + Duration::from_secs_f64(bytes.len() as f64 / bytes_per_second);
         self.answers.push_back((self.free + round_trip, answer));
         self.sent += bytes.len();
@@ -101,7 +104,7 @@ impl Terminal {
         arriving.into_iter().chain(self.answers.front().map(|(when, _)| *when)).min()
     }
 
-    /// The colours of the parts of all cells, or of the pixels.
+    /// The colors of the parts of all cells, or of the pixels.
     fn seen(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
@@ -117,7 +120,7 @@ impl Terminal {
     }
 }
 
-/// The colours of the parts of a cell of blocks; `None`: it has other characters, or the terminal's own colours.
+/// The colors of the parts of a cell of blocks; `None`: it has other characters, or the terminal's own colors.
 fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
     let color = |color| match color {
         vt100::Color::Default => None,
@@ -132,11 +135,11 @@ fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
 }
 
 /// A render that somebody watches.
-struct Watch {
-    desk: Desk,
+struct WatchedRender {
+    ui: TestUi,
     presenter: Presenter,
     outbox: Rc<RefCell<Vec<Vec<u8>>>>,
-    terminal: Terminal,
+    terminal: SimulatedTerminal,
     slot: PreviewSlot,
     begin: Instant,
     size: (u32, u32),
@@ -148,21 +151,21 @@ struct Watch {
     turn: u32,
 }
 
-impl Watch {
-    fn new(line: Line, preview: PreviewKind, depth: ColorDepth) -> Self {
-        let mut desk = Desk::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
-        let begin = desk.now;
-        let generation = desk.state.request.generation;
-        desk.worker(protocol::Event::Started { generation });
+impl WatchedRender {
+    fn new(line: SimulatedConnection, preview: PreviewKind, depth: ColorDepth) -> Self {
+        let mut ui = TestUi::with(state_with(COLUMNS, ROWS, preview, depth, Overrides::default()));
+        let begin = ui.now;
+        let generation = ui.state.request.generation;
+        ui.worker(protocol::Event::Started { generation });
         let settings = Box::new(settings());
-        desk.worker(protocol::Event::Settings {
+        ui.worker(protocol::Event::Settings {
             generation,
             settings,
             camera: camera(),
             exposure: 0.0,
             own: own(),
         });
-        let size = desk.state.request.preview_size.expect("previews are asked for");
+        let size = ui.state.request.preview_size.expect("previews are asked for");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {
             PreviewKind::Pixels(protocol) => Some(Images::new(protocol, false)),
@@ -170,12 +173,12 @@ impl Watch {
         };
         let taken = Rc::clone(&outbox);
         let out = Box::new(move |bytes| taken.borrow_mut().push(bytes));
-        let display = Display::new(depth, Way::default(), images, out, begin);
+        let display = Display::new(depth, TerminalLink::default(), images, out, begin);
         Self {
             presenter: Presenter::new(display, slot.clone(), begin),
-            desk,
+            ui,
             outbox,
-            terminal: Terminal::new(line, begin),
+            terminal: SimulatedTerminal::new(line, begin),
             slot,
             begin,
             size: (size.width, size.height),
@@ -195,70 +198,70 @@ impl Watch {
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
-        let end = self.desk.now + time;
-        let (mut key, mut last) = (self.desk.now, self.desk.state.request.generation);
+        let end = self.ui.now + time;
+        let (mut key, mut last) = (self.ui.now, self.ui.state.request.generation);
         // The last step of a key that was held before may have no picture yet.
-        let mut asked = Some(self.desk.now);
-        while self.desk.now < end {
+        let mut asked = Some(self.ui.now);
+        while self.ui.now < end {
             let next = asked.map_or(key, |asked: Instant| key.min(asked + FIRST));
             self.go_on(next, false);
-            if asked.is_some_and(|asked| self.desk.now >= asked + FIRST) {
+            if asked.is_some_and(|asked| self.ui.now >= asked + FIRST) {
                 asked = None;
                 self.turn += 1;
                 self.put_picture(1.0);
             }
-            if self.desk.now >= key {
+            if self.ui.now >= key {
                 key += REPEAT;
-                self.desk.press('l');
+                self.ui.press('l');
             }
             // A step that waited is requested when the step before has its picture.
-            if self.desk.state.request.generation > last {
-                (asked, last) = (Some(self.desk.now), self.desk.state.request.generation);
+            if self.ui.state.request.generation > last {
+                (asked, last) = (Some(self.ui.now), self.ui.state.request.generation);
             }
         }
     }
 
     /// The last picture, until all of it has arrived.
     fn finish(&mut self) {
-        let generation = self.desk.state.request.generation;
+        let generation = self.ui.state.request.generation;
         self.put_picture(SAMPLES);
-        self.desk.worker(done(generation, Vec::new(), false));
-        self.go_on(self.desk.now + Duration::from_secs(5), false);
+        self.ui.worker(done(generation, Vec::new(), false));
+        self.go_on(self.ui.now + Duration::from_secs(5), false);
     }
 
     fn go_on(&mut self, end: Instant, is_at_work: bool) {
         loop {
-            let now = self.desk.now;
-            self.presenter.draw_if_due(&mut self.desk.state, now);
-            for event in self.presenter.pump(&self.desk.state, now, || false) {
+            let now = self.ui.now;
+            self.presenter.draw_if_due(&mut self.ui.state, now);
+            for event in self.presenter.pump(&self.ui.state, now, || false) {
                 self.happen(event);
             }
             for bytes in std::mem::take(&mut *self.outbox.borrow_mut()) {
                 self.presenter.display.written(bytes.len());
                 self.terminal.send(bytes, now);
             }
-            let wake = self.presenter.wake(&self.desk.state, now);
+            let wake = self.presenter.wake(&self.ui.state, now);
             let work = self.next.into_iter().filter(|_| is_at_work).min();
             let next = [wake, work, self.terminal.next()].into_iter().flatten().min().unwrap_or(end);
             if next >= end {
-                self.desk.now = end;
+                self.ui.now = end;
                 self.terminal.pass(end);
                 return;
             }
-            self.desk.now = next.max(now);
+            self.ui.now = next.max(now);
             self.events(is_at_work);
         }
     }
 
     /// Events by now.
     fn events(&mut self, is_at_work: bool) {
-        let now = self.desk.now;
+        let now = self.ui.now;
         self.terminal.pass(now);
         while let Some((_, answer)) = self.terminal.answers.pop_front_if(|(when, _)| *when <= now) {
             self.presenter.display.answered(answer, now);
         }
         let done = (now - self.begin).as_secs_f64() / SECONDS;
-        let generation = self.desk.state.request.generation;
+        let generation = self.ui.state.request.generation;
         if is_at_work && now >= self.next[0] {
             self.next[0] = now + PROGRESS;
             let progress = progress(done, Some((1.0 - done) * SECONDS));
@@ -268,17 +271,17 @@ impl Watch {
                 total_samples: SAMPLES as u32,
                 ..progress
             };
-            self.desk.worker(protocol::Event::Progress { generation, progress });
+            self.ui.worker(protocol::Event::Progress { generation, progress });
         }
         if is_at_work && now >= self.next[1] {
             self.next[1] = now + PICTURE;
             self.put_picture((done * SAMPLES).max(1.0));
         }
-        self.desk.event(Event::Tick);
+        self.ui.event(Event::Tick);
     }
 
     fn put_picture(&mut self, samples: f64) {
-        let generation = self.desk.state.request.generation;
+        let generation = self.ui.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
         *self.slot.lock().expect("whole") = Some(LatestPreview {
             generation,
@@ -288,18 +291,18 @@ impl Watch {
             lacks_photons: false,
             source: None,
         });
-        if let Some(event) = self.presenter.preview(generation, &self.desk.state, self.desk.now) {
+        if let Some(event) = self.presenter.preview(generation, &self.ui.state, self.ui.now) {
             self.happen(event);
         }
     }
 
     fn happen(&mut self, event: Event) {
         self.shown += usize::from(matches!(event, Event::Shown { .. }));
-        self.desk.event(event);
+        self.ui.event(event);
     }
 }
 
-/// A room of soft colours, seen from a place, with the noise of so many samples.
+/// A room of soft colors, seen from a place, with the noise of so many samples.
 fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
     /// Codes, of one sample: about that of a Cornell box.
     const NOISE: f64 = 1.2;
@@ -331,7 +334,7 @@ const MOST: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
 /// Checks that the screen is near the final one at each fraction of [`MOST`], and that there are enough pictures.
 #[track_caller]
 fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
-    let mut watch = Watch::new(QUICK, preview, depth);
+    let mut watch = WatchedRender::new(QUICK, preview, depth);
     let screens = MOST.map(|(fraction, _)| {
         watch.until(fraction);
         watch.terminal.seen()
@@ -357,7 +360,7 @@ fn a_quick_terminal_follows_the_render_in_sextants() {
 }
 
 #[test]
-fn a_quick_terminal_follows_the_render_in_256_colours() {
+fn a_quick_terminal_follows_the_render_in_256_colors() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
 }
 
@@ -368,7 +371,7 @@ fn a_quick_terminal_follows_the_render_in_pixels() {
 
 #[test]
 fn a_thin_line_carries_few_pictures_and_no_queue_of_them() {
-    let mut watch = Watch::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    let mut watch = WatchedRender::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(1.0);
     assert!(watch.shown <= 12, "{} pictures in 10 s", watch.shown);
     let sent = watch.terminal.sent;
@@ -382,7 +385,7 @@ fn a_thin_line_carries_few_pictures_and_no_queue_of_them() {
 
 #[test]
 fn a_held_key_fills_a_thin_line() {
-    let mut watch = Watch::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+    let mut watch = WatchedRender::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(0.2);
     watch.orbit(Duration::from_secs(2));
     let before = watch.terminal.sent;
@@ -399,8 +402,8 @@ fn only_cells_are_sent_between_marks() {
     for (preview, is_marked) in
         [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(Protocol::Kitty), false)]
     {
-        let mut watch = Watch::new(QUICK, preview, ColorDepth::TrueColor);
-        watch.presenter.display.answered(Answer::Synchronized { is_known: true }, watch.begin);
+        let mut watch = WatchedRender::new(QUICK, preview, ColorDepth::TrueColor);
+        watch.presenter.display.answered(TerminalReply::Synchronized { is_known: true }, watch.begin);
         watch.until(0.1);
         let sent = String::from_utf8_lossy(&watch.terminal.bytes).into_owned();
         let between: Vec<&str> =

@@ -23,25 +23,25 @@ fn previewed(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
 }
 
 /// The settings of a scene of this size, and its picture at the requested size.
-fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
-    let generation = desk.state.request.generation;
-    desk.worker(protocol::Event::Started { generation });
+fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
+    let generation = ui.state.request.generation;
+    ui.worker(protocol::Event::Started { generation });
     let settings = Box::new(Effective { width, height, ..settings() });
-    desk.worker(protocol::Event::Settings {
+    ui.worker(protocol::Event::Settings {
         generation,
         settings,
         camera: camera(),
         exposure: 0.0,
         own: own(),
     });
-    show(desk, (width, height));
+    show(ui, (width, height));
 }
 
-fn show(desk: &mut Desk, size: (u32, u32)) {
-    let generation = desk.state.request.generation;
-    let (width, height) = previewed(size, desk.state.request.preview_size.expect("a preview"));
+fn show(ui: &mut TestUi, size: (u32, u32)) {
+    let generation = ui.state.request.generation;
+    let (width, height) = previewed(size, ui.state.request.preview_size.expect("a preview"));
     let picture = plain_picture(width, height, RED);
-    desk.event(Event::Picture {
+    ui.event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -64,15 +64,15 @@ fn the_picture_gets_the_space() {
     for window in WINDOWS {
         for size in SIZES {
             let most = most_cells(window, size);
-            let mut desk = Desk::with(state(window.0, window.1));
-            rendered(&mut desk, size);
-            let share = cells_of(&mut desk, RED) as f64 / most;
+            let mut ui = TestUi::with(state(window.0, window.1));
+            rendered(&mut ui, size);
+            let share = cells_of(&mut ui, RED) as f64 / most;
             println!("{window:?} {size:?}: {share:.3}");
-            assert!(share >= 0.75, "{window:?} {size:?}: {share:.3}\n{}", desk.text());
-            desk.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Tab));
-            show(&mut desk, size);
-            let share = cells_of(&mut desk, RED) as f64 / most;
-            assert!(share >= 0.95, "{window:?} {size:?} alone: {share:.3}\n{}", desk.text());
+            assert!(share >= 0.75, "{window:?} {size:?}: {share:.3}\n{}", ui.text());
+            ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Tab));
+            show(&mut ui, size);
+            let share = cells_of(&mut ui, RED) as f64 / most;
+            assert!(share >= 0.95, "{window:?} {size:?} alone: {share:.3}\n{}", ui.text());
         }
     }
 }
@@ -80,49 +80,49 @@ fn the_picture_gets_the_space() {
 #[test]
 fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
     for (columns, rows) in WINDOWS.into_iter().chain([(40, 12), (30, 8), (80, 60)]) {
-        let mut desk = Desk::with(state(columns, rows));
-        rendered(&mut desk, (640, 480));
-        let place = |desk: &Desk| {
-            let Layout { header, preview, panel, under, keys, pane } = Layout::of(&desk.state);
+        let mut ui = TestUi::with(state(columns, rows));
+        rendered(&mut ui, (640, 480));
+        let place = |ui: &TestUi| {
+            let Layout { header, preview, panel, under, keys, pane } = Layout::of(&ui.state);
             [header, preview, panel, under, keys, pane]
         };
-        let before = place(&desk);
-        let generation = desk.state.request.generation;
+        let before = place(&ui);
+        let generation = ui.state.request.generation;
         for step in 0..10 {
             match step {
-                0 => desk.worker(protocol::Event::Stage {
+                0 => ui.worker(protocol::Event::Stage {
                     generation,
                     stage: stage(Stage::Textures, Status::Running, 0.0, ""),
                 }),
-                1 => desk.worker(protocol::Event::Asset { generation, progress: asset("bricks", 3, 8) }),
-                2 => desk.worker(protocol::Event::Progress { generation, progress: progress(0.5, None) }),
-                3 => desk.press(' '),
-                4 => desk.press('0'),
-                5 => desk.worker(protocol::Event::Written {
+                1 => ui.worker(protocol::Event::Asset { generation, progress: asset("bricks", 3, 8) }),
+                2 => ui.worker(protocol::Event::Progress { generation, progress: progress(0.5, None) }),
+                3 => ui.press(' '),
+                4 => ui.press('0'),
+                5 => ui.worker(protocol::Event::Written {
                     generation,
                     path: "cornell.png".into(),
                     bytes: 1,
                     is_own: true,
                 }),
-                6 => desk.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false)),
-                7 => desk.event(Event::Changed(Changed { noticed: desk.now })),
+                6 => ui.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false)),
+                7 => ui.event(Event::Changed(Changed { noticed: ui.now })),
                 8 => {
-                    desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
+                    ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
                     Vec::new()
                 }
-                _ => desk.event(Event::Settled),
+                _ => ui.event(Event::Settled),
             };
-            desk.screen();
-            assert_eq!(place(&desk), before, "step {step} at {columns}×{rows}");
+            ui.screen();
+            assert_eq!(place(&ui), before, "step {step} at {columns}×{rows}");
         }
     }
 }
 
 #[test]
 fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
-    let mut desk = Desk::new();
+    let mut ui = TestUi::new();
     let settings = |width| Box::new(Effective { width, height: 480, ..settings() });
-    let same = desk.worker(protocol::Event::Settings {
+    let same = ui.worker(protocol::Event::Settings {
         generation: 1,
         settings: settings(640),
         camera: camera(),
@@ -130,7 +130,7 @@ fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
         own: own(),
     });
     assert!(same.is_empty(), "{same:?}");
-    let wide = desk.worker(protocol::Event::Settings {
+    let wide = ui.worker(protocol::Event::Settings {
         generation: 1,
         settings: settings(1200),
         camera: camera(),
@@ -146,18 +146,18 @@ fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
 #[test]
 fn small_windows_are_usable() {
     for (columns, rows) in [(40, 12), (30, 8)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(9.0)) });
-        let text = desk.text();
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(9.0)) });
+        let text = ui.text();
         assert!(text.contains("● rendering") && text.contains("50 %"), "{text}");
         assert!(text.contains("? help") && text.contains("s soft"), "{text}");
-        desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(4567.0)) });
-        assert!(desk.text().contains("50 %"), "how far it is before how long: {}", desk.text());
-        rendered(&mut desk, (640, 480));
-        let share = cells_of(&mut desk, RED) as f64 / most_cells((columns, rows), (640, 480));
-        assert!(share >= 0.7, "{share:.3}\n{}", desk.text());
-        desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-        let text = desk.text();
+        ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(4567.0)) });
+        assert!(ui.text().contains("50 %"), "how far it is before how long: {}", ui.text());
+        rendered(&mut ui, (640, 480));
+        let share = cells_of(&mut ui, RED) as f64 / most_cells((columns, rows), (640, 480));
+        assert!(share >= 0.7, "{share:.3}\n{}", ui.text());
+        ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        let text = ui.text();
         assert!(text.contains("✗ broken") && text.contains("error: unknown key `heigth`"), "{text}");
         assert!(text.contains("scenes/cornell.toml:3:1"), "{text}");
     }
@@ -165,46 +165,46 @@ fn small_windows_are_usable() {
 
 #[test]
 fn the_line_under_the_picture_tells_how_far_it_is_and_then_what_it_took() {
-    let mut desk = Desk::with(state(120, 40));
-    let under = |desk: &mut Desk| desk.text().lines().nth(38).map(str::to_owned).unwrap_or_default();
+    let mut ui = TestUi::with(state(120, 40));
+    let under = |ui: &mut TestUi| ui.text().lines().nth(38).map(str::to_owned).unwrap_or_default();
     let of = |name, status, seconds| protocol::Event::Stage {
         generation: 1,
         stage: stage(name, status, seconds, ""),
     };
-    desk.worker(of(Stage::Textures, Status::Running, 0.0));
-    desk.worker(protocol::Event::Asset { generation: 1, progress: asset("bricks", 1, 2) });
-    assert!(under(&mut desk).starts_with("textures ━") && under(&mut desk).trim_end().ends_with("─ 0.0 s"));
-    desk.worker(of(Stage::Textures, Status::Done, 0.1));
-    desk.worker(of(Stage::Render, Status::Running, 0.0));
-    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
-    assert!(under(&mut desk).starts_with("render ━"), "{}", under(&mut desk));
-    assert!(under(&mut desk).contains("─ 32/64 samples · 0.0 s"), "{}", under(&mut desk));
-    desk.worker(done(1, Vec::new(), false));
-    assert!(under(&mut desk).starts_with("parse 250 ms, meshes 250 ms, "), "{}", under(&mut desk));
+    ui.worker(of(Stage::Textures, Status::Running, 0.0));
+    ui.worker(protocol::Event::Asset { generation: 1, progress: asset("bricks", 1, 2) });
+    assert!(under(&mut ui).starts_with("textures ━") && under(&mut ui).trim_end().ends_with("─ 0.0 s"));
+    ui.worker(of(Stage::Textures, Status::Done, 0.1));
+    ui.worker(of(Stage::Render, Status::Running, 0.0));
+    ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    assert!(under(&mut ui).starts_with("render ━"), "{}", under(&mut ui));
+    assert!(under(&mut ui).contains("─ 32/64 samples · 0.0 s"), "{}", under(&mut ui));
+    ui.worker(done(1, Vec::new(), false));
+    assert!(under(&mut ui).starts_with("parse 250 ms, meshes 250 ms, "), "{}", under(&mut ui));
 }
 
 #[test]
 fn times_are_told_against_those_of_the_last_render() {
-    let mut desk = Desk::new();
-    let render = |desk: &mut Desk, seconds| {
-        let generation = desk.state.request.generation;
-        desk.worker(protocol::Event::Started { generation });
+    let mut ui = TestUi::new();
+    let render = |ui: &mut TestUi, seconds| {
+        let generation = ui.state.request.generation;
+        ui.worker(protocol::Event::Started { generation });
         let report = stage(Stage::Render, Status::Done, seconds, "");
-        desk.worker(protocol::Event::Stage { generation, stage: report });
+        ui.worker(protocol::Event::Stage { generation, stage: report });
     };
-    render(&mut desk, 1.42);
-    assert!(!desk.text().contains("1.42 s −") && !desk.text().contains("1.42 s +"));
-    desk.event(Event::Changed(Changed { noticed: desk.now }));
-    render(&mut desk, 1.12);
-    assert!(desk.text().contains("render   1.12 s −.3 s"), "{}", desk.text());
-    desk.press('r');
-    desk.worker(protocol::Event::Started { generation: desk.state.request.generation });
-    desk.press('r');
-    render(&mut desk, 2.24);
+    render(&mut ui, 1.42);
+    assert!(!ui.text().contains("1.42 s −") && !ui.text().contains("1.42 s +"));
+    ui.event(Event::Changed(Changed { noticed: ui.now }));
+    render(&mut ui, 1.12);
+    assert!(ui.text().contains("render   1.12 s −.3 s"), "{}", ui.text());
+    ui.press('r');
+    ui.worker(protocol::Event::Started { generation: ui.state.request.generation });
+    ui.press('r');
+    render(&mut ui, 2.24);
     assert!(
-        desk.text().contains("render  2.24 s +1.1 s"),
+        ui.text().contains("render  2.24 s +1.1 s"),
         "one that was cancelled does not count: {}",
-        desk.text()
+        ui.text()
     );
 }
 
@@ -212,83 +212,83 @@ fn times_are_told_against_those_of_the_last_render() {
 fn the_screen_tells_whoever_has_not_saved_yet_to_save() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         for size in SIZES {
-            let mut desk = Desk::with(state(columns, rows));
-            rendered(&mut desk, size);
-            desk.worker(done(1, Vec::new(), false));
+            let mut ui = TestUi::with(state(columns, rows));
+            rendered(&mut ui, size);
+            ui.worker(done(1, Vec::new(), false));
             // All stages alike leave no room for it in the narrow window.
-            desk.state.work.stages = Default::default();
-            assert!(desk.text().contains("save cornell.toml"), "{}", desk.text());
-            desk.event(Event::Changed(Changed { noticed: desk.now }));
-            desk.worker(done(2, Vec::new(), false));
-            assert!(!desk.text().contains("save cornell.toml"), "{}", desk.text());
+            ui.state.work.stages = Default::default();
+            assert!(ui.text().contains("save cornell.toml"), "{}", ui.text());
+            ui.event(Event::Changed(Changed { noticed: ui.now }));
+            ui.worker(done(2, Vec::new(), false));
+            assert!(!ui.text().contains("save cornell.toml"), "{}", ui.text());
         }
     }
 }
 
 #[test]
 fn the_folded_line_names_no_file_of_another_picture() {
-    let mut desk = Desk::new();
-    let finish = |desk: &mut Desk| {
-        let generation = desk.state.request.generation;
-        rendered(desk, (320, 200));
-        desk.worker(done(generation, Vec::new(), false));
-        let settings = desk.state.request.effective.as_mut().expect("settings");
+    let mut ui = TestUi::new();
+    let finish = |ui: &mut TestUi| {
+        let generation = ui.state.request.generation;
+        rendered(ui, (320, 200));
+        ui.worker(done(generation, Vec::new(), false));
+        let settings = ui.state.request.effective.as_mut().expect("settings");
         (settings.width, settings.height) = (320, 200);
         // All stages alike leave no room for a file.
-        desk.state.work.stages = Default::default();
+        ui.state.work.stages = Default::default();
     };
-    finish(&mut desk);
-    desk.worker(protocol::Event::Written {
+    finish(&mut ui);
+    ui.worker(protocol::Event::Written {
         generation: 1,
         path: "dof.png".into(),
         bytes: 63_000,
         is_own: true,
     });
     assert!(
-        Layout::of(&desk.state).panel.is_empty() && desk.text().contains("→ dof.png 63.0 kB"),
+        Layout::of(&ui.state).panel.is_empty() && ui.text().contains("→ dof.png 63.0 kB"),
         "{}",
-        desk.text()
+        ui.text()
     );
-    desk.press('l');
-    finish(&mut desk);
+    ui.press('l');
+    finish(&mut ui);
     // A key without another effect clears the message about the move.
-    desk.press('?');
-    desk.press('?');
-    let text = desk.text();
+    ui.press('?');
+    ui.press('?');
+    let text = ui.text();
     assert!(text.contains("not saved · w saves it") && !text.contains("dof.png 63"), "{text}");
-    desk.press('w');
-    desk.worker(protocol::Event::Written {
+    ui.press('w');
+    ui.worker(protocol::Event::Written {
         generation: 2,
         path: "dof.png".into(),
         bytes: 64_000,
         is_own: false,
     });
-    desk.press('?');
-    desk.press('?');
-    let text = desk.text();
+    ui.press('?');
+    ui.press('?');
+    let text = ui.text();
     assert!(text.contains("→ dof.png 64.0 kB") && !text.contains("not saved"), "{text}");
 }
 
 #[test]
 fn hints_wrap_at_the_width_of_the_panel() {
     for (columns, rows, width) in [(80, 24, 480), (120, 40, 480), (160, 40, 480)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.finish(RED);
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.finish(RED);
         let settings = Box::new(Effective { width, height: 480, ..settings() });
-        desk.worker(protocol::Event::Settings {
+        ui.worker(protocol::Event::Settings {
             generation: 1,
             settings,
             camera: camera(),
             exposure: 0.0,
             own: own(),
         });
-        let panel = Layout::of(&desk.state).panel;
+        let panel = Layout::of(&ui.state).panel;
         let hint = "save cornell.toml to render again";
         assert_eq!(
-            desk.text().contains(hint),
+            ui.text().contains(hint),
             usize::from(panel.width) >= hint.len(),
             "{panel:?}\n{}",
-            desk.text()
+            ui.text()
         );
     }
 }

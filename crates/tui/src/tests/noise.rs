@@ -7,55 +7,55 @@ use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
 
 #[test]
 fn the_noise_is_told_as_it_falls() {
-    let mut desk = Desk::new();
-    desk.worker(protocol::Event::Started { generation: 1 });
+    let mut ui = TestUi::new();
+    ui.worker(protocol::Event::Started { generation: 1 });
     let noise = Some(NoiseProgress { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
     let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
-    desk.worker(protocol::Event::Progress { generation: 1, progress });
+    ui.worker(protocol::Event::Progress { generation: 1, progress });
     for (columns, rows, words) in [
         (80, 24, "noise 2.1 %, 1 % in about 14 s · 32/64 samples"),
         (54, 20, "noise 2.1 % · 32/64 samples"),
         (36, 20, "32/64 samples"),
     ] {
-        desk.event(Event::Resize(window(columns, rows)));
-        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+        ui.event(Event::Resize(window(columns, rows)));
+        assert!(ui.text().contains(words), "{words}: {}", ui.text());
     }
-    assert!(!desk.text().contains("noise"), "{}", desk.text());
+    assert!(!ui.text().contains("noise"), "{}", ui.text());
     // A pause has no end that is known.
-    desk.event(Event::Resize(window(80, 24)));
-    desk.press(' ');
-    assert!(desk.text().contains("noise 2.1 % · 32/64 samples"), "{}", desk.text());
+    ui.event(Event::Resize(window(80, 24)));
+    ui.press(' ');
+    assert!(ui.text().contains("noise 2.1 % · 32/64 samples"), "{}", ui.text());
 }
 
 #[test]
 fn samples_have_no_total_while_noise_decides_it() {
-    let mut desk = Desk::new();
-    desk.worker(protocol::Event::Started { generation: 1 });
+    let mut ui = TestUi::new();
+    ui.worker(protocol::Event::Started { generation: 1 });
     let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
-    desk.worker(protocol::Event::Settings {
+    ui.worker(protocol::Event::Settings {
         generation: 1,
         settings,
         camera: camera(),
         exposure: 0.0,
         own: own(),
     });
-    desk.worker(protocol::Event::Progress {
+    ui.worker(protocol::Event::Progress {
         generation: 1,
         progress: RenderProgress { is_total_fixed: false, ..progress(0.5, None) },
     });
-    assert!(desk.text().contains("about 32 samples per pixel"), "{}", desk.text());
+    assert!(ui.text().contains("about 32 samples per pixel"), "{}", ui.text());
 }
 
 /// The end of a render with `error`, or with a budget of time: whether it was complete, and the samples that it had.
 fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
     let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
-    let mut desk = Desk::with(state_with(80, 24, kind, depth, overrides));
-    desk.finish(RED);
-    let report = desk.state.work.report.as_mut().expect("a report");
+    let mut ui = TestUi::with(state_with(80, 24, kind, depth, overrides));
+    ui.finish(RED);
+    let report = ui.state.work.report.as_mut().expect("a report");
     (report.image.complete, report.image.samples.max) = (complete, samples);
-    desk.state.request.effective.as_mut().expect("settings").error = error;
-    desk.text()
+    ui.state.request.effective.as_mut().expect("settings").error = error;
+    ui.text()
 }
 
 #[test]
@@ -78,20 +78,20 @@ fn what_ended_a_render_is_told_if_several_things_could() {
 
 #[test]
 fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    assert!(desk.text().contains("0.81 % in all") && !desk.text().contains("a tile"), "{}", desk.text());
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    assert!(ui.text().contains("0.81 % in all") && !ui.text().contains("a tile"), "{}", ui.text());
     for (samples, words) in [(64, "0.5 % a tile "), (256, "0.5 % a tile ✓")] {
-        desk.state.request.effective.as_mut().expect("settings").error = 0.005;
-        desk.state.request.effective.as_mut().expect("settings").samples = samples;
-        assert!(desk.text().contains(words), "{words}: {}", desk.text());
+        ui.state.request.effective.as_mut().expect("settings").error = 0.005;
+        ui.state.request.effective.as_mut().expect("settings").samples = samples;
+        assert!(ui.text().contains(words), "{words}: {}", ui.text());
     }
 }
 
 #[test]
 fn noise_has_two_digits() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
-    assert!(desk.text().contains("43 % in all"), "{}", desk.text());
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
+    assert!(ui.text().contains("43 % in all"), "{}", ui.text());
 }

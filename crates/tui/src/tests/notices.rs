@@ -12,59 +12,59 @@ const LONGER: &str = "the camera was saved since keys moved it: camera.position 
     press c again to write over it, or 0 to go back to the saved one";
 
 /// A desk on whose screen a notice stands while a render is half done.
-fn half_done(window: (u16, u16), notice: &str) -> Desk {
-    let mut desk = Desk::with(state(window.0, window.1));
-    desk.finish(RED);
-    desk.press('r');
-    let generation = desk.state.request.generation;
-    desk.worker(protocol::Event::Started { generation });
-    desk.worker(protocol::Event::Progress { generation, progress: progress(0.5, Some(2.0)) });
-    crate::update::say(&mut desk.state, notice);
-    desk
+fn half_done(window: (u16, u16), notice: &str) -> TestUi {
+    let mut ui = TestUi::with(state(window.0, window.1));
+    ui.finish(RED);
+    ui.press('r');
+    let generation = ui.state.request.generation;
+    ui.worker(protocol::Event::Started { generation });
+    ui.worker(protocol::Event::Progress { generation, progress: progress(0.5, Some(2.0)) });
+    crate::update::say(&mut ui.state, notice);
+    ui
 }
 
 #[test]
 fn a_notice_expires_after_four_seconds() {
     for window in WINDOWS {
-        let mut desk = Desk::with(state(window.0, window.1));
-        desk.finish(RED);
-        desk.press(']');
-        desk.finish(BLUE);
-        assert!(desk.text().contains(SHORT), "{}", desk.text());
-        desk.wait(3900);
-        assert!(desk.text().contains(SHORT), "{}", desk.text());
+        let mut ui = TestUi::with(state(window.0, window.1));
+        ui.finish(RED);
+        ui.press(']');
+        ui.finish(BLUE);
+        assert!(ui.text().contains(SHORT), "{}", ui.text());
+        ui.wait(3900);
+        assert!(ui.text().contains(SHORT), "{}", ui.text());
         // Nothing else happens meanwhile: the loop has to wake up for it.
-        let wake = desk.state.next_tick().expect("a tick");
-        assert!(wake <= desk.now + std::time::Duration::from_millis(100));
-        desk.state.dirty = false;
-        desk.wait(100);
-        assert!(desk.state.dirty);
-        let rows = desk.text();
+        let wake = ui.state.next_tick().expect("a tick");
+        assert!(wake <= ui.now + std::time::Duration::from_millis(100));
+        ui.state.dirty = false;
+        ui.wait(100);
+        assert!(ui.state.dirty);
+        let rows = ui.text();
         // The line of keys has it as what `0` resets.
         let above = rows.lines().rev().skip(1).any(|row| row.contains(SHORT));
         assert!(!above, "{rows}");
-        assert_eq!(desk.state.next_tick(), None);
+        assert_eq!(ui.state.next_tick(), None);
     }
 }
 
 #[test]
 fn a_later_notice_has_its_own_four_seconds() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.press(']');
-    desk.wait(3000);
-    desk.press(']');
-    desk.finish(BLUE);
-    desk.wait(3000);
-    assert!(desk.text().contains("exposure +0.5"), "{}", desk.text());
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.press(']');
+    ui.wait(3000);
+    ui.press(']');
+    ui.finish(BLUE);
+    ui.wait(3000);
+    assert!(ui.text().contains("exposure +0.5"), "{}", ui.text());
 }
 
 #[test]
 fn a_notice_leaves_progress_in_sight() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
-            let mut desk = half_done(window, notice);
-            let text = desk.text();
+            let mut ui = half_done(window, notice);
+            let text = ui.text();
             let begin: String = notice.chars().take(30).collect();
             assert!(text.contains(&begin), "{window:?} {text}");
             assert!(text.contains("32/64 samples"), "{window:?} {text}");
@@ -77,16 +77,16 @@ fn a_notice_leaves_progress_in_sight() {
 fn a_notice_leaves_the_written_file_in_sight() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
-            let mut desk = Desk::with(state(window.0, window.1));
-            desk.worker(protocol::Event::Written {
+            let mut ui = TestUi::with(state(window.0, window.1));
+            ui.worker(protocol::Event::Written {
                 generation: 1,
                 path: "cornell.png".into(),
                 bytes: 90_200,
                 is_own: true,
             });
-            desk.finish(RED);
-            crate::update::say(&mut desk.state, notice);
-            assert!(desk.text().contains("→ cornell.png"), "{window:?} {}", desk.text());
+            ui.finish(RED);
+            crate::update::say(&mut ui.state, notice);
+            assert!(ui.text().contains("→ cornell.png"), "{window:?} {}", ui.text());
         }
     }
 }
@@ -94,13 +94,13 @@ fn a_notice_leaves_the_written_file_in_sight() {
 /// Where there is no line under the image, the notice takes the place of the keys, for its time.
 #[test]
 fn in_a_low_window_the_keys_return() {
-    let mut desk = Desk::with(state(60, 8));
-    desk.finish(RED);
-    desk.press(']');
-    desk.finish(BLUE);
-    assert!(!desk.text().contains("q quit"), "{}", desk.text());
-    desk.wait(4000);
-    assert!(desk.text().contains("q quit"), "{}", desk.text());
+    let mut ui = TestUi::with(state(60, 8));
+    ui.finish(RED);
+    ui.press(']');
+    ui.finish(BLUE);
+    assert!(!ui.text().contains("q quit"), "{}", ui.text());
+    ui.wait(4000);
+    assert!(ui.text().contains("q quit"), "{}", ui.text());
 }
 
 #[test]
@@ -110,16 +110,16 @@ fn faults_and_prompts_stay_until_a_key() {
         path: Some("cornell.png".into()),
         message: "cannot write cornell.png: disk full".to_owned(),
     };
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.worker(failed);
-    desk.wait(60_000);
-    assert!(desk.text().contains("disk full"), "{}", desk.text());
-    desk.press('f');
-    desk.wait(60_000);
-    assert!(desk.text().contains("click where to focus"), "{}", desk.text());
-    desk.press('f');
-    desk.event(Event::Lost(crate::event::Source::Watcher));
-    desk.wait(60_000);
-    assert!(desk.text().contains("no longer watched"), "{}", desk.text());
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.worker(failed);
+    ui.wait(60_000);
+    assert!(ui.text().contains("disk full"), "{}", ui.text());
+    ui.press('f');
+    ui.wait(60_000);
+    assert!(ui.text().contains("click where to focus"), "{}", ui.text());
+    ui.press('f');
+    ui.event(Event::Lost(crate::event::EventSource::Watcher));
+    ui.wait(60_000);
+    assert!(ui.text().contains("no longer watched"), "{}", ui.text());
 }

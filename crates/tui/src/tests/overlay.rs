@@ -19,12 +19,12 @@ const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
 #[test]
 fn the_help_shows_every_line_of_the_tables_in_every_window() {
     for (columns, rows) in [(80, 24), (120, 40), (80, 12), (80, 8)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.press('?');
-        let mut seen = desk.text();
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.press('?');
+        let mut seen = ui.text();
         for _ in 0..60 {
-            desk.press('j');
-            seen += &desk.text();
+            ui.press('j');
+            seen += &ui.text();
         }
         let lines =
             KEYMAP.iter().map(|it| (it.label, it.help)).chain(OVERLAY.iter().map(|it| (it.label, it.help)));
@@ -33,16 +33,16 @@ fn the_help_shows_every_line_of_the_tables_in_every_window() {
             let line = line.unwrap_or_else(|| panic!("{help:?} is not in\n{seen}"));
             assert!(line.contains(label), "{line:?}");
         }
-        desk.key(ESCAPE);
-        assert!(!desk.text().contains(" keys "));
+        ui.key(ESCAPE);
+        assert!(!ui.text().contains(" keys "));
     }
 }
 
 #[test]
 fn the_help_scrolls_by_every_key_and_stops_at_its_ends() {
-    let mut desk = Desk::with(state(60, 12));
-    desk.press('?');
-    let top = desk.text();
+    let mut ui = TestUi::with(state(60, 12));
+    ui.press('?');
+    let top = ui.text();
     assert!(top.contains("j k scroll") && top.contains("esc close"), "{top}");
     let special = |code| KeyPress::special(code);
     for (forth, back) in [
@@ -50,36 +50,36 @@ fn the_help_scrolls_by_every_key_and_stops_at_its_ends() {
         (special(KeyCode::Down), special(KeyCode::Up)),
         (special(KeyCode::PageDown), special(KeyCode::PageUp)),
     ] {
-        desk.key(forth);
-        assert_ne!(desk.text(), top, "{forth:?}");
-        desk.key(back);
-        assert_eq!(desk.text(), top, "{back:?}");
-        desk.key(back);
-        assert!(!desk.state.dirty, "the top is the top");
+        ui.key(forth);
+        assert_ne!(ui.text(), top, "{forth:?}");
+        ui.key(back);
+        assert_eq!(ui.text(), top, "{back:?}");
+        ui.key(back);
+        assert!(!ui.state.dirty, "the top is the top");
     }
     for _ in 0..60 {
-        desk.press('j');
+        ui.press('j');
     }
-    desk.screen();
-    desk.press('j');
-    assert!(!desk.state.dirty, "the end is the end");
-    desk.press('?');
-    desk.press('?');
-    assert_eq!(desk.text(), top, "it opens at its top");
+    ui.screen();
+    ui.press('j');
+    assert!(!ui.state.dirty, "the end is the end");
+    ui.press('?');
+    ui.press('?');
+    assert_eq!(ui.text(), top, "it opens at its top");
 }
 
 #[test]
 fn the_help_can_be_read_in_a_small_window() {
     for (columns, rows) in [(40, 12), (30, 8)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.press('?');
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.press('?');
         let mut seen = String::new();
         for _ in 0..200 {
-            assert!(!desk.text().contains('…'), "{}", desk.text());
+            assert!(!ui.text().contains('…'), "{}", ui.text());
             // The first line of the page: each line is there once.
-            let line = desk.text().lines().nth(1).map(str::to_owned).unwrap_or_default();
+            let line = ui.text().lines().nth(1).map(str::to_owned).unwrap_or_default();
             seen += &line.replace(['│', '╭', '╮'], " ");
-            desk.press('j');
+            ui.press('j');
         }
         let seen: Vec<&str> = seen.split_whitespace().collect();
         for help in KEYMAP.iter().map(|it| it.help).filter(|help| !help.is_empty()).take(20) {
@@ -92,25 +92,25 @@ fn the_help_can_be_read_in_a_small_window() {
 #[test]
 fn scrolling_is_offered_where_there_is_something_to_scroll() {
     for (rows, is_long) in [(24, true), (60, false)] {
-        let mut desk = Desk::with(state(80, rows));
-        desk.press('?');
-        assert!(desk.text().contains("esc close"), "{}", desk.text());
-        assert_eq!(desk.text().contains("j k scroll"), is_long, "{}", desk.text());
+        let mut ui = TestUi::with(state(80, rows));
+        ui.press('?');
+        assert!(ui.text().contains("esc close"), "{}", ui.text());
+        assert_eq!(ui.text().contains("j k scroll"), is_long, "{}", ui.text());
     }
     for (faults, is_long) in [(9, true), (1, false)] {
-        let mut desk = Desk::new();
-        desk.fail((0..faults).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
-        assert!(desk.text().contains("esc close"), "{}", desk.text());
-        assert_eq!(desk.text().contains("j k scroll"), is_long, "{}", desk.text());
+        let mut ui = TestUi::new();
+        ui.fail((0..faults).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+        assert!(ui.text().contains("esc close"), "{}", ui.text());
+        assert_eq!(ui.text().contains("j k scroll"), is_long, "{}", ui.text());
     }
 }
 
 #[test]
 fn the_help_leaves_no_cut_words_beside_it() {
-    let mut desk = Desk::with(state(120, 40));
-    desk.finish(RED);
-    desk.press('?');
-    let text = desk.text();
+    let mut ui = TestUi::with(state(120, 40));
+    ui.finish(RED);
+    ui.press('?');
+    let text = ui.text();
     let beside = |line: &str| line.split(['╭', '╰']).next().is_some_and(|left| left.trim().is_empty());
     let edges: Vec<&str> = text.lines().filter(|line| line.contains(['╭', '╰'])).collect();
     assert!(edges.len() == 2 && edges.into_iter().all(beside), "{text}");
@@ -118,110 +118,110 @@ fn the_help_leaves_no_cut_words_beside_it() {
 
 #[test]
 fn the_way_out_of_the_help_is_told_before_its_pages() {
-    let mut desk = Desk::with(state(40, 12));
-    desk.press('?');
-    assert!(desk.text().contains("esc close"), "{}", desk.text());
+    let mut ui = TestUi::with(state(40, 12));
+    ui.press('?');
+    assert!(ui.text().contains("esc close"), "{}", ui.text());
 }
 
 #[test]
 fn views_are_listed_and_chosen_by_digits() {
     for (columns, rows) in [(80, 24), (120, 40), (120, 24), (40, 12), (30, 8)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.finish(RED);
-        desk.press('5');
-        assert_eq!(desk.state.request.view(), View::Beauty, "no list, no digits");
-        desk.press('v');
-        let text = desk.text();
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.finish(RED);
+        ui.press('5');
+        assert_eq!(ui.state.request.view(), View::Beauty, "no list, no digits");
+        ui.press('v');
+        let text = ui.text();
         assert!(
             text.contains("▸2 normal") && text.contains("1 beauty") && text.contains("3 depth"),
             "{text}"
         );
-        let effects = desk.press('3');
+        let effects = ui.press('3');
         let wanted = request(&effects).expect("a request").overrides.view;
         assert_eq!(wanted, Some(View::Depth));
-        assert!(desk.text().contains("▸3 depth"), "{}", desk.text());
+        assert!(ui.text().contains("▸3 depth"), "{}", ui.text());
         // A digit always means the same view.
         for _ in 0..7 {
-            desk.press('v');
+            ui.press('v');
         }
-        assert!(desk.text().contains("▸  emission"), "{}", desk.text());
-        desk.press('9');
-        assert_eq!(desk.state.request.view(), View::Specular);
-        desk.key(ESCAPE);
-        assert!(!desk.text().contains("▸"));
-        desk.press('1');
-        assert_eq!(desk.state.request.view(), View::Specular, "the list is closed");
+        assert!(ui.text().contains("▸  emission"), "{}", ui.text());
+        ui.press('9');
+        assert_eq!(ui.state.request.view(), View::Specular);
+        ui.key(ESCAPE);
+        assert!(!ui.text().contains("▸"));
+        ui.press('1');
+        assert_eq!(ui.state.request.view(), View::Specular, "the list is closed");
     }
 }
 
 #[test]
 fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60), (30, 8)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.finish(RED);
-        desk.press('v');
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.finish(RED);
+        ui.press('v');
         let down = KeyPress::special(KeyCode::Down);
         for (number, view) in View::ALL.iter().enumerate().skip(2) {
-            let effects = desk.key(if number % 2 == 0 { down } else { KeyPress::plain('j') });
+            let effects = ui.key(if number % 2 == 0 { down } else { KeyPress::plain('j') });
             let overrides = request(&effects).expect("a request").overrides.clone();
             assert_eq!((overrides.view, overrides.camera.is_any()), (Some(*view), false));
-            let text = desk.text();
+            let text = ui.text();
             let is_marked = |line: &str| line.contains('▸') && line.contains(view.name());
             assert!(text.lines().any(is_marked), "{} at {columns}×{rows}:\n{text}", view.name());
         }
-        assert!(desk.press('j').is_empty(), "the end is the end");
-        assert_eq!(request(&desk.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
+        assert!(ui.press('j').is_empty(), "the end is the end");
+        assert_eq!(request(&ui.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
         for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
-            desk.key(KeyPress::special(key));
-            assert!(!desk.state.request.toggles.camera.is_any(), "{key:?} belongs to the list");
+            ui.key(KeyPress::special(key));
+            assert!(!ui.state.request.toggles.camera.is_any(), "{key:?} belongs to the list");
         }
-        desk.key(KeyPress::special(KeyCode::Enter));
-        assert!(!desk.text().contains('▸'), "{}", desk.text());
-        desk.press('j');
-        assert!(desk.state.request.toggles.camera.is_any(), "the list is closed");
+        ui.key(KeyPress::special(KeyCode::Enter));
+        assert!(!ui.text().contains('▸'), "{}", ui.text());
+        ui.press('j');
+        assert!(ui.state.request.toggles.camera.is_any(), "the list is closed");
     }
 }
 
 #[test]
 fn a_view_is_found_by_its_name() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.press('v');
-    assert!(desk.press('/').is_empty());
-    desk.press('d');
-    assert_eq!(desk.state.request.view(), View::Depth, "the first that begins so");
-    desk.press('i');
-    assert_eq!(desk.state.request.view(), View::Diffuse);
-    assert!(desk.text().contains("/ di"), "{}", desk.text());
-    desk.key(KeyPress::special(KeyCode::Backspace));
-    assert_eq!(desk.state.request.view(), View::Depth);
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.press('v');
+    assert!(ui.press('/').is_empty());
+    ui.press('d');
+    assert_eq!(ui.state.request.view(), View::Depth, "the first that begins so");
+    ui.press('i');
+    assert_eq!(ui.state.request.view(), View::Diffuse);
+    assert!(ui.text().contains("/ di"), "{}", ui.text());
+    ui.key(KeyPress::special(KeyCode::Backspace));
+    assert_eq!(ui.state.request.view(), View::Depth);
     for letter in "qqq".chars() {
-        assert!(desk.press(letter).is_empty(), "it quits nothing");
+        assert!(ui.press(letter).is_empty(), "it quits nothing");
     }
-    assert_eq!(desk.state.request.view(), View::Depth, "no name has these letters");
-    desk.key(KeyPress::special(KeyCode::Enter));
-    assert!(desk.state.overlays.views.is_none());
-    assert_eq!(desk.state.request.view(), View::Depth);
+    assert_eq!(ui.state.request.view(), View::Depth, "no name has these letters");
+    ui.key(KeyPress::special(KeyCode::Enter));
+    assert!(ui.state.overlays.views.is_none());
+    assert_eq!(ui.state.request.view(), View::Depth);
 }
 
 #[test]
 fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
-    let mut desk = Desk::with(state(120, 40));
-    desk.finish(RED);
+    let mut ui = TestUi::with(state(120, 40));
+    ui.finish(RED);
     let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
-    desk.worker(protocol::Event::Settings {
+    ui.worker(protocol::Event::Settings {
         generation: 1,
         settings,
         camera: camera(),
         exposure: 0.0,
         own: own(),
     });
-    desk.press('v');
-    let generation = desk.state.request.generation;
-    desk.worker(protocol::Event::Started { generation });
-    let panel = crate::view::layout::Layout::of(&desk.state).panel;
+    ui.press('v');
+    let generation = ui.state.request.generation;
+    ui.worker(protocol::Event::Started { generation });
+    let panel = crate::view::layout::Layout::of(&ui.state).panel;
     assert!(panel.height > VIEWS, "{panel:?}");
-    let screen = desk.screen();
+    let screen = ui.screen();
     for row in panel.y + VIEWS..panel.bottom() {
         let line: String = (panel.x..panel.right()).map(|column| screen[(column, row)].symbol()).collect();
         assert_eq!(line.trim(), "", "row {row}");
@@ -230,54 +230,54 @@ fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
 
 #[test]
 fn the_list_of_views_goes_by_itself() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.press('v');
-    desk.finish(RED);
-    let wake = desk.state.next_tick().expect("the list asks to be woken");
-    assert!(wake > desk.now);
-    desk.wait(3000);
-    desk.press('v');
-    desk.wait(3000);
-    assert!(desk.text().contains("▸3 depth"), "each key gives it another moment");
-    desk.wait(2000);
-    assert!(desk.state.dirty && !desk.text().contains("▸"));
-    desk.finish(RED);
-    assert_eq!(desk.state.next_tick(), None);
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.press('v');
+    ui.finish(RED);
+    let wake = ui.state.next_tick().expect("the list asks to be woken");
+    assert!(wake > ui.now);
+    ui.wait(3000);
+    ui.press('v');
+    ui.wait(3000);
+    assert!(ui.text().contains("▸3 depth"), "each key gives it another moment");
+    ui.wait(2000);
+    assert!(ui.state.dirty && !ui.text().contains("▸"));
+    ui.finish(RED);
+    assert_eq!(ui.state.next_tick(), None);
 }
 
 #[test]
 fn a_list_of_views_that_is_cut_off_says_so_and_lies_over_no_message() {
     for (columns, rows, is_cut) in [(40, 10, true), (30, 8, true), (40, 16, false)] {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.finish(RED);
-        desk.press('v');
-        let text = desk.text();
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.finish(RED);
+        ui.press('v');
+        let text = ui.text();
         assert!(text.contains('▾') == is_cut && !text.contains('▴'), "{columns}×{rows}\n{text}");
         assert!(text.contains("1-9 choose"), "{columns}×{rows}\n{text}");
         let words = ["preview only", "save image"];
         assert!(!words.iter().any(|words| text.contains(words)), "{columns}×{rows}\n{text}");
         // The mark scrolls with the view.
         for _ in 0..View::ALL.len() {
-            desk.press('j');
+            ui.press('j');
         }
-        let text = desk.text();
+        let text = ui.text();
         assert!(text.contains('▴') == is_cut && !text.contains('▾'), "{columns}×{rows}\n{text}");
-        desk.key(ESCAPE);
-        assert!(desk.text().contains("(preview only)"), "{columns}×{rows}\n{}", desk.text());
+        ui.key(ESCAPE);
+        assert!(ui.text().contains("(preview only)"), "{columns}×{rows}\n{}", ui.text());
     }
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.press('v');
-    let text = desk.text();
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.press('v');
+    let text = ui.text();
     assert!(!text.contains(['▴', '▾']) && text.contains("view normal (preview only)"), "{text}");
 }
 
 #[test]
 fn of_a_fault_in_many_places_ten_are_told() {
-    let mut desk = Desk::with(state(120, 40));
-    desk.fail((1..=20).map(|line| at(Severity::Error, "no material is named `wal`", line)).collect());
-    let text = desk.text();
+    let mut ui = TestUi::with(state(120, 40));
+    ui.fail((1..=20).map(|line| at(Severity::Error, "no material is named `wal`", line)).collect());
+    let text = ui.text();
     let words = "also in 19 places: 2:1, 3:1, 4:1, 5:1, 6:1, 7:1, 8:1, 9:1, 10:1 and 10 more";
     assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{text}");
 }
@@ -290,16 +290,16 @@ fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
 
 #[test]
 fn errors_come_before_warnings_and_one_fault_is_told_once_with_its_places() {
-    let mut desk = Desk::with(state(120, 40));
+    let mut ui = TestUi::with(state(120, 40));
     let material = |line| at(Severity::Error, "no material is named `wal`", line);
-    desk.fail(vec![
+    ui.fail(vec![
         at(Severity::Warning, "texture `b` is not used", 1),
         material(12),
         material(5),
         at(Severity::Error, "unknown key `radios`", 3),
         material(17),
     ]);
-    let text = desk.text();
+    let text = ui.text();
     assert!(text.contains("4 errors"), "{text}");
     assert_eq!(text.matches("no material is named").count(), 1, "{text}");
     assert!(
@@ -315,50 +315,50 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
     for (columns, rows, width, is_beside) in
         [(160, 40, 640, true), (80, 60, 640, true), (80, 24, 480, true), (80, 24, 640, false)]
     {
-        let mut desk = Desk::with(state(columns, rows));
-        desk.finish(RED);
+        let mut ui = TestUi::with(state(columns, rows));
+        ui.finish(RED);
         let settings = Box::new(Effective { width, height: 480, ..settings() });
-        desk.worker(protocol::Event::Settings {
+        ui.worker(protocol::Event::Settings {
             generation: 1,
             settings,
             camera: camera(),
             exposure: 0.0,
             own: own(),
         });
-        let before = cells_of(&mut desk, RED);
-        desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-        assert!(desk.text().contains("error: unknown key `heigth`"), "{}", desk.text());
-        let after = cells_of(&mut desk, RED);
-        assert_eq!(after == before, is_beside, "{after} of {before} at {columns}×{rows}\n{}", desk.text());
+        let before = cells_of(&mut ui, RED);
+        ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        assert!(ui.text().contains("error: unknown key `heigth`"), "{}", ui.text());
+        let after = cells_of(&mut ui, RED);
+        assert_eq!(after == before, is_beside, "{after} of {before} at {columns}×{rows}\n{}", ui.text());
     }
 }
 
 #[test]
 fn keys_do_not_open_errors_again_that_were_closed() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
+    let mut ui = TestUi::new();
+    ui.finish(RED);
     let fault = || vec![diagnostic(Severity::Error, "unknown key `heigth`")];
-    desk.fail(fault());
-    desk.key(ESCAPE);
-    desk.press('v');
-    desk.fail(fault());
-    assert!(!desk.state.overlays.diagnostics.open, "{}", desk.text());
-    desk.fail(vec![diagnostic(Severity::Error, "another one")]);
-    assert!(desk.state.overlays.diagnostics.open, "what is new is shown");
+    ui.fail(fault());
+    ui.key(ESCAPE);
+    ui.press('v');
+    ui.fail(fault());
+    assert!(!ui.state.overlays.diagnostics.open, "{}", ui.text());
+    ui.fail(vec![diagnostic(Severity::Error, "another one")]);
+    assert!(ui.state.overlays.diagnostics.open, "what is new is shown");
 }
 
 #[test]
 fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
-    let mut desk = Desk::new();
-    desk.finish(RED);
-    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-    let first = desk.press('h');
+    let mut ui = TestUi::new();
+    ui.finish(RED);
+    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    let first = ui.press('h');
     assert!(request(&first).is_some());
-    desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-    assert!(request(&desk.press('h')).is_none(), "the first has no picture yet");
-    let generation = desk.state.request.generation;
+    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    assert!(request(&ui.press('h')).is_none(), "the first has no picture yet");
+    let generation = ui.state.request.generation;
     let picture = plain_picture(50, 38, RED);
-    let effects = desk.event(Event::Picture {
+    let effects = ui.event(Event::Picture {
         generation,
         picture,
         range: None,
@@ -371,55 +371,55 @@ fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
 
 #[test]
 fn of_more_errors_than_anybody_reads_the_first_are_shown() {
-    let mut desk = Desk::with(state(120, 40));
-    desk.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    let mut ui = TestUi::with(state(120, 40));
+    ui.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     for _ in 0..100 {
-        desk.key(KeyPress::special(KeyCode::PageDown));
+        ui.key(KeyPress::special(KeyCode::PageDown));
     }
-    assert!(desk.text().contains("… 19900 more faults are not shown"), "{}", desk.text());
+    assert!(ui.text().contains("… 19900 more faults are not shown"), "{}", ui.text());
 }
 
 #[test]
 fn errors_scroll_by_every_key() {
-    let mut desk = Desk::new();
-    desk.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
-    let top = desk.text();
-    desk.press('j');
-    assert_ne!(desk.text(), top);
-    desk.press('k');
-    assert_eq!(desk.text(), top);
+    let mut ui = TestUi::new();
+    ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
+    let top = ui.text();
+    ui.press('j');
+    assert_ne!(ui.text(), top);
+    ui.press('k');
+    assert_eq!(ui.text(), top);
     for (forth, back) in [(KeyCode::Down, KeyCode::Up), (KeyCode::PageDown, KeyCode::PageUp)] {
-        desk.key(KeyPress::special(forth));
-        assert_ne!(desk.text(), top, "{forth:?}");
-        desk.key(KeyPress::special(back));
-        assert_eq!(desk.text(), top, "{back:?}");
+        ui.key(KeyPress::special(forth));
+        assert_ne!(ui.text(), top, "{forth:?}");
+        ui.key(KeyPress::special(back));
+        assert_eq!(ui.text(), top, "{back:?}");
     }
-    desk.key(ESCAPE);
-    assert!(!desk.text().contains("wrong number"));
-    desk.screen();
-    desk.key(ESCAPE);
-    assert!(!desk.state.dirty, "nothing is open");
+    ui.key(ESCAPE);
+    assert!(!ui.text().contains("wrong number"));
+    ui.screen();
+    ui.key(ESCAPE);
+    assert!(!ui.state.dirty, "nothing is open");
 }
 
 #[test]
 fn a_long_failure_is_wrapped_between_words() {
-    let mut desk = Desk::with(state(40, 12));
+    let mut ui = TestUi::with(state(40, 12));
     let failure =
         Failure::Work("cannot write /a/rather/long/name/of/a/folder/image.png: no such folder".to_owned());
-    desk.worker(protocol::Event::Failed { generation: 1, failure });
-    assert!(desk.text().contains("such folder"), "{}", desk.text());
+    ui.worker(protocol::Event::Failed { generation: 1, failure });
+    assert!(ui.text().contains("such folder"), "{}", ui.text());
 }
 
 #[test]
 fn a_resize_keeps_what_is_open_in_the_window() {
-    let mut desk = Desk::new();
-    desk.press('?');
+    let mut ui = TestUi::new();
+    ui.press('?');
     for (columns, rows) in [(30, 8), (200, 60), (10, 2), (1, 1), (80, 24)] {
-        desk.event(Event::Resize(window(columns, rows)));
+        ui.event(Event::Resize(window(columns, rows)));
         for _ in 0..5 {
-            desk.press('j');
+            ui.press('j');
         }
-        desk.screen();
+        ui.screen();
     }
-    assert!(desk.text().contains(" keys "), "{}", desk.text());
+    assert!(ui.text().contains(" keys "), "{}", ui.text());
 }

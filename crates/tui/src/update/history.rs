@@ -86,11 +86,11 @@ pub(super) fn close(state: &mut State, words: &str) -> Vec<Effect> {
     Vec::new()
 }
 
-fn newest(state: &State) -> Option<crate::history::Shown> {
+fn newest(state: &State) -> Option<crate::history::ShownImage> {
     if state.picture.history.is_open() { state.picture.history.newest() } else { state.picture.shown.clone() }
 }
 
-fn look_at(state: &mut State, shown: crate::history::Shown) -> Vec<Effect> {
+fn look_at(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The first line says which one it is, and how old, which goes on.
     let older = if state.picture.history.is_oldest_open() { "" } else { "n older · " };

@@ -1,6 +1,5 @@
 //! State and event in, effects out. Nothing here touches the world.
 
-mod answers;
 mod camera;
 mod history;
 mod keys;
@@ -8,6 +7,7 @@ mod overlay;
 mod places;
 mod pointer;
 mod rectangle;
+mod replies;
 mod request;
 mod say;
 mod views;
@@ -19,8 +19,8 @@ use self::request::{render, resized_preview};
 pub(super) use self::say::say;
 use self::say::say_until_key;
 use super::ExitStatus;
-use super::event::{Effect, Event, Signal, Source, Window};
-use super::history::Shown;
+use super::event::{Effect, Event, EventSource, Signal, Window};
+use super::history::ShownImage;
 use super::options::Changed;
 use super::preview_kind::PreviewKind;
 use super::state::{Message, OwnImage, PendingChange, State};
@@ -57,7 +57,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Mouse(mouse) => pointer::update(state, mouse),
         // There is nothing to type text into; the loop tells the line what that has to know.
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
-        Event::Answer(answer) => answers::learn(state, answer),
+        Event::TerminalReply(answer) => replies::learn(state, answer),
         Event::Frame(report) => {
             state.dirty |= state.display.frame != Some(report);
             state.display.frame = Some(report);
@@ -66,7 +66,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
         Event::Picture { generation, picture, range, section, lacks_photons, source } => {
-            show(state, Shown { generation, picture, range, section, lacks_photons, source })
+            show(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
             // It may be glimt's own save, or one that kept glimt from its own: the message about that stays.
@@ -120,7 +120,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
     }
 }
 
-fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
+fn show(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     if shown.generation == state.request.generation
         && is_whole(&shown.picture)
         && state.display.kind != PreviewKind::None
@@ -130,7 +130,7 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let is_its = |last: &Shown| last.generation == shown.generation || last.is_of_same_image(&shown);
+        let is_its = |last: &ShownImage| last.generation == shown.generation || last.is_of_same_image(&shown);
         let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
             Some(last) if state.display.mixes_colors() => steadied(shown, &last),
@@ -141,11 +141,11 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
     Vec::new()
 }
 
-/// A picture whose pixels keep the colours of the one before it that they hardly differ from. Where colours are mixed from a
+/// A picture whose pixels keep the colors of the one before it that they hardly differ from. Where colors are mixed from a
 /// few others, one code more is quite another mixture.
-fn steadied(mut shown: Shown, last: &Shown) -> Shown {
+fn steadied(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
     const HARDLY: u8 = 1;
-    let what = |shown: &Shown| (shown.picture.width, shown.picture.height, shown.section);
+    let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);
     if what(&shown) == what(last) {
         let mut picture = (*shown.picture).clone();
         for (new, old) in picture.pixels.iter_mut().zip(&last.picture.pixels) {
@@ -190,7 +190,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     let is_over = |message: &mut Message| message.until.is_some_and(|until| now >= until);
     state.dirty |= state.overlays.message.take_if(is_over).is_some();
     if state.display.pixels_until.is_some_and(|until| now >= until) {
-        answers::lack_pixels(state);
+        replies::lack_pixels(state);
     }
     if state.request.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
@@ -212,14 +212,14 @@ fn signalled(signal: Signal) -> Effect {
     }
 }
 
-fn lost(state: &mut State, source: Source) -> Vec<Effect> {
+fn lost(state: &mut State, source: EventSource) -> Vec<Effect> {
     match source {
-        Source::Worker => vec![Effect::GiveUp],
-        Source::Watcher => {
+        EventSource::Worker => vec![Effect::GiveUp],
+        EventSource::Watcher => {
             worker::settled(state);
             say_until_key(state, "files are no longer watched: r renders again");
             Vec::new()
         }
-        Source::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],
+        EventSource::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],
     }
 }

@@ -1,19 +1,19 @@
 //! The place that the editor opens.
 
-use crate::event::FilePlace;
+use crate::event::FilePosition;
 use crate::scene::diagnostic::{Diagnostic, Place};
 use crate::state::State;
 
 /// The first error, else what was clicked, else the first warning, else the scene.
-pub(super) fn to_edit(state: &State) -> FilePlace {
+pub(super) fn to_edit(state: &State) -> FilePosition {
     let errors = state.overlays.problems.iter().flat_map(|problems| &problems.diagnostics).find_map(in_file);
     let warnings = || state.overlays.warnings.iter().find_map(in_file);
-    let scene = || FilePlace { path: state.request.scene.clone(), line: 1, column: 1 };
+    let scene = || FilePosition { path: state.request.scene.clone(), line: 1, column: 1 };
     errors.or_else(|| state.selection.picked.clone()).or_else(warnings).unwrap_or_else(scene)
 }
 
 /// The place of a diagnostic, if it is in a file.
-fn in_file(diagnostic: &Diagnostic) -> Option<FilePlace> {
+fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
     let Place { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;
     let start = before.rfind('\n').map_or(0, |end| end + 1);
@@ -21,5 +21,9 @@ fn in_file(diagnostic: &Diagnostic) -> Option<FilePlace> {
     let column = before.get(start..)?.chars().count() + 1;
     let path = diagnostic.path.clone();
     // What the call sets is in no file.
-    (!path.as_os_str().is_empty() && path.as_os_str() != "--set").then_some(FilePlace { path, line, column })
+    (!path.as_os_str().is_empty() && path.as_os_str() != "--set").then_some(FilePosition {
+        path,
+        line,
+        column,
+    })
 }

@@ -2,8 +2,7 @@
 
 use super::say::{notify, prompt, say};
 use super::{camera, history, overlay, rectangle};
-use crate::chrome;
-use crate::event::FilePlace;
+use crate::event::FilePosition;
 use crate::event::{Effect, Mouse, MouseKind};
 use crate::keymap::Overlay;
 use crate::math::decimal::{decimal_step, rounded};
@@ -14,6 +13,7 @@ use crate::state::{PickPurpose, Press, State};
 use crate::view;
 use crate::view::layout::Layout;
 use crate::view::preview::spot_at;
+use crate::window_title;
 
 /// Degrees that a drag over the width of the picture's area turns by.
 const TURN_ACROSS: f64 = 180.0;
@@ -147,7 +147,7 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
     }
     let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
     state.selection.picked =
-        in_text.map(|thing| FilePlace { path: thing.path.clone(), line: thing.line, column: 1 });
+        in_text.map(|thing| FilePosition { path: thing.path.clone(), line: thing.line, column: 1 });
     match (state.selection.purpose, &picked.thing) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
@@ -201,10 +201,10 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
         return notify(state, &format!("to copy, drag with shift (or after m): {clicked}"));
     }
     say(state, format!("copied: {clicked}"));
-    vec![Effect::Aside(chrome::copy(&clicked))]
+    vec![Effect::Aside(window_title::copy(&clicked))]
 }
 
-/// Shape and name, line, material, distance, place, colour, normal.
+/// Shape and name, line, material, distance, place, color, normal.
 fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", numbers(color.map(f64::from))));
     let Some(thing) = thing else {

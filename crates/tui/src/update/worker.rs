@@ -6,8 +6,7 @@ use std::time::Duration;
 use super::request::resized_preview;
 use super::say::{say, say_until_key};
 use super::{camera, history, pointer};
-use crate::chrome;
-use crate::event::{Effect, Unwritten};
+use crate::event::{Effect, WriteFailure};
 use crate::exit_summary;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
@@ -17,7 +16,8 @@ use crate::pipeline::protocol::{
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, AssetBar, OwnImage, Pane, Problems, Rendering, State, Written};
+use crate::state::{Activity, AssetBar, OwnImage, Pane, Problems, Rendering, State, WrittenFile};
+use crate::window_title;
 
 /// Why a picture that is not on disk is not there.
 const UNWRITTEN: &str = "not written: e says why";
@@ -99,11 +99,11 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             if !is_by_hand || state.work.activity == Activity::Done {
                 state.saving.unwritten = Some(UNWRITTEN.to_owned());
             }
-            let is_it = |written: &&mut Written| Some(&written.path) == path.as_ref();
+            let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
             state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
             say_until_key(state, format!("error: {}", visible(&message)));
             state.saving.write_failed =
-                Some(Unwritten { why: message, generation: state.request.generation, is_refused: false });
+                Some(WriteFailure { why: message, generation: state.request.generation, is_refused: false });
         }
         Event::NotKept { message, .. } => say_until_key(state, format!("warning: {}", visible(&message))),
         Event::Checkpoint { news, .. } => match news {
@@ -159,7 +159,7 @@ fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
     let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
     let notice = time.zip(state.display.abilities.notice);
-    notice.map(|(time, way)| Effect::Aside(chrome::notice(state, way, time))).into_iter().collect()
+    notice.map(|(time, way)| Effect::Aside(window_title::notice(state, way, time))).into_iter().collect()
 }
 
 fn generation(event: &Event) -> u64 {
@@ -263,7 +263,7 @@ fn note(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64
     if !is_own && state.saving.own.state == OwnState::Written {
         state.saving.own.state = OwnState::Begun { is_rendering: false };
     }
-    let written = Written { path, bytes, generation, made, shows, is_stale: false, lost: None };
+    let written = WrittenFile { path, bytes, generation, made, shows, is_stale: false, lost: None };
     state.saving.written.push(written);
 }
 
@@ -298,7 +298,7 @@ fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     say(state, "nothing is written (e shows why)");
     let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
     let generation = state.request.generation;
-    state.saving.write_failed = Some(Unwritten { why, generation, is_refused: true });
+    state.saving.write_failed = Some(WriteFailure { why, generation, is_refused: true });
     if !conflicts.iter().all(|conflict| state.overlays.warnings.contains(conflict)) {
         state.overlays.diagnostics = Pane { open: true, scroll: 0 };
     }

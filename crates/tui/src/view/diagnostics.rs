@@ -7,7 +7,7 @@ use ratatui::layout::Rect;
 use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
-use super::stages::Line;
+use super::stages::StyledLine;
 use super::text::{Tone, counted, put, put_right, row, wrapped};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::{self, Role};
@@ -81,12 +81,12 @@ pub(crate) fn extent(state: &State) -> (usize, usize) {
     span(&text, area)
 }
 
-fn span(text: &[Line], area: Rect) -> (usize, usize) {
+fn span(text: &[StyledLine], area: Rect) -> (usize, usize) {
     let page = usize::from(area.height.saturating_sub(1)).max(1);
     (page, text.len().saturating_sub(page))
 }
 
-fn text(state: &State, area: Rect) -> Vec<Line> {
+fn text(state: &State, area: Rect) -> Vec<StyledLine> {
     let width = usize::from(area.width);
     let Some(problems) = &state.overlays.problems else { return reported(&state.reported(), width) };
     let mut text = Vec::new();
@@ -98,7 +98,7 @@ fn text(state: &State, area: Rect) -> Vec<Line> {
 }
 
 /// Lines of the diagnostics, errors first; a fault in several places appears once, with all of them.
-fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
+fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
     for one in diagnostics {
@@ -116,17 +116,18 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
         fault.sort_by_key(|one| start(one));
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
-    let mut lines: Vec<Line> = faults.iter().take(MOST).flat_map(|fault| one_fault(fault, width)).collect();
+    let mut lines: Vec<StyledLine> =
+        faults.iter().take(MOST).flat_map(|fault| one_fault(fault, width)).collect();
     lines.pop();
     if let Some(more @ 1..) = faults.len().checked_sub(MOST) {
-        lines.push(Line::new());
+        lines.push(StyledLine::new());
         lines.push(vec![(format!("… {} are not shown", counted(more, "more fault")), Tone::Plain)]);
     }
     lines
 }
 
 /// The first place in full, the others by line and column; an empty line.
-fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
+fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         Role::Text => Tone::Plain,
         Role::Error => Tone::Error,
@@ -138,7 +139,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
     let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
     // The report ends with an empty line and a count, which stands in the title.
     lines.truncate(lines.len().saturating_sub(2));
-    let mut lines: Vec<Line> = lines.into_iter().map(line).collect();
+    let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
     let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
     if !places.is_empty() {
         let shown = places.len().min(MOST_PLACES - 1);
@@ -150,7 +151,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
         let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
         lines.extend(toned(&text, width, Tone::Plain));
     }
-    lines.push(Line::new());
+    lines.push(StyledLine::new());
     lines
 }
 
@@ -161,6 +162,6 @@ fn place(one: &Diagnostic) -> Option<String> {
     Some(format!("{line}:{column}"))
 }
 
-fn toned(text: &str, width: usize, tone: Tone) -> Vec<Line> {
+fn toned(text: &str, width: usize, tone: Tone) -> Vec<StyledLine> {
     wrapped(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
 }

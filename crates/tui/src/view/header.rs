@@ -51,7 +51,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// The state in its colour. Returns the columns used.
+/// The state in its color. Returns the columns used.
 fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let (sign, word, tone) = activity(state);
     let mut text = format!(" {sign} {word} ");
@@ -67,7 +67,7 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     end - area.x
 }
 
-/// A sign, a word and a colour, each of which tells it.
+/// A sign, a word and a color, each of which tells it.
 pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
     if state.picture.history.is_open() { ("◂", "older", Tone::Warning) } else { work(state) }
 }

@@ -96,16 +96,16 @@ fn area(state: &State) -> Rect {
     // The line of keys tells how to scroll and to close.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
     let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;
-    let wide = centred(above, width, above.height);
+    let wide = centered(above, width, above.height);
     let height = u16::try_from(lines(inner(wide).width).len()).unwrap_or(u16::MAX).saturating_add(2);
-    centred(above, width, height)
+    centered(above, width, height)
 }
 
 fn inner(area: Rect) -> Rect {
     if area.height > 3 && area.width > 3 { Block::bordered().inner(area) } else { area }
 }
 
-fn centred(area: Rect, width: u16, height: u16) -> Rect {
+fn centered(area: Rect, width: u16, height: u16) -> Rect {
     let (width, height) = (width.min(area.width), height.min(area.height));
     Rect { x: area.x + (area.width - width) / 2, y: area.y + (area.height - height) / 2, width, height }
 }

@@ -16,14 +16,14 @@ use crate::scene::report::summary;
 use crate::state::{Activity, State, Toggles, ViewList};
 
 /// A key with its description, in full and in short.
-struct Hint {
+struct KeyHint {
     key: &'static str,
     words: String,
     short: String,
     tone: Tone,
 }
 
-impl Hint {
+impl KeyHint {
     fn new(key: &'static str, words: impl Into<String>) -> Self {
         let words = words.into();
         Self { key, short: words.clone(), words, tone: Tone::Faint }
@@ -52,9 +52,9 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if layout.under.is_empty() && message::is_said(state, layout) {
         return;
     }
-    let ways = [Hint::of(Action::Quit), Hint::of(Action::ToggleHelp)];
-    let ways: Vec<Hint> = ways.into_iter().flatten().collect();
-    let width = |hints: &[Hint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
+    let ways = [KeyHint::of(Action::Quit), KeyHint::of(Action::ToggleHelp)];
+    let ways: Vec<KeyHint> = ways.into_iter().flatten().collect();
+    let width = |hints: &[KeyHint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
     // The help is never left out.
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
@@ -73,14 +73,14 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 
 /// Toggles and what is of use: what is urgent has its place, then the toggles, then what else there is room for.
 fn fitting(
-    (urgent, useful): (Vec<Hint>, Vec<Hint>),
-    toggles: Vec<Hint>,
+    (urgent, useful): (Vec<KeyHint>, Vec<KeyHint>),
+    toggles: Vec<KeyHint>,
     room: u16,
     is_long: bool,
-) -> Vec<Hint> {
+) -> Vec<KeyHint> {
     let mut left = room;
-    let mut take = |hints: Vec<Hint>| -> Vec<Hint> {
-        let fits = |hint: &Hint| {
+    let mut take = |hints: Vec<KeyHint>| -> Vec<KeyHint> {
+        let fits = |hint: &KeyHint| {
             let width = hint.width(is_long);
             let fits = width <= left;
             left -= if fits { width } else { 0 };
@@ -93,14 +93,14 @@ fn fitting(
     toggles.into_iter().chain(urgent).chain(take(useful)).collect()
 }
 
-fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
+fn show(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
     let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.said(is_long), hint.tone)];
     put(buffer, area, &pieces, state.display.depth);
     hint.width(is_long)
 }
 
 /// Each toggle with its value, in bold where the keys have changed it.
-fn toggles(state: &State) -> Vec<Hint> {
+fn toggles(state: &State) -> Vec<KeyHint> {
     // They are those of the newest picture.
     if state.picture.history.is_open() {
         return Vec::new();
@@ -125,16 +125,16 @@ fn toggles(state: &State) -> Vec<Hint> {
     let hint = |(action, name, value, is_changed): (Action, &str, String, bool)| {
         let key = keymap::of(action)?.label.split(' ').next()?;
         let words = format!("{name} {value}").trim_start().to_owned();
-        Some(Hint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
+        Some(KeyHint { key, words, short: value, tone: if is_changed { Tone::Strong } else { Tone::Faint } })
     };
     all.into_iter().filter_map(hint).collect()
 }
 
 /// Hints of use now: the urgent ones, and the others.
-fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
-    let overlay = |wanted: &[Overlay]| -> Vec<Hint> {
+fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
+    let overlay = |wanted: &[Overlay]| -> Vec<KeyHint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
-        of.map(|it| Hint::new(it.label, it.hint)).collect()
+        of.map(|it| KeyHint::new(it.label, it.hint)).collect()
     };
     let closing = || overlay(&[Overlay::Close]);
     // The keys that scroll, where something is out of sight.
@@ -152,7 +152,7 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         urgent.extend(scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(unseen(state));
-    let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
+    let named = |action, words| keymap::of(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
     if has_place && !is_mesh(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
@@ -166,7 +166,7 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         };
         urgent.extend(both);
         // All else is about the newest one.
-        return (urgent, Hint::of(Action::PictureAlone).into_iter().collect());
+        return (urgent, KeyHint::of(Action::PictureAlone).into_iter().collect());
     }
     if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
@@ -176,10 +176,10 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     if state.request.first_section.is_some() {
         let first = named(Action::RectangleFirst, "rectangle first");
-        urgent.extend(first.map(|hint| Hint { tone: Tone::Strong, ..hint }));
+        urgent.extend(first.map(|hint| KeyHint { tone: Tone::Strong, ..hint }));
     }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
-    let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
+    let changed = |words| KeyHint { tone: Tone::Strong, ..KeyHint::new(reset, words) };
     let changes = state.request.changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
@@ -187,8 +187,8 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         Activity::Running { .. } => &[Action::TogglePause],
         Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
     };
-    let first = now.iter().filter_map(|action| Hint::of(*action)).map(|hint| going_on(hint, state));
-    let (held, first): (Vec<Hint>, Vec<Hint>) = first.partition(|_| state.work.paused);
+    let first = now.iter().filter_map(|action| KeyHint::of(*action)).map(|hint| going_on(hint, state));
+    let (held, first): (Vec<KeyHint>, Vec<KeyHint>) = first.partition(|_| state.work.paused);
     urgent.extend(held);
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
@@ -204,16 +204,16 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         .filter(is_shown)
         .filter(is_idle)
         .filter(is_back)
-        .map(|it| Hint::new(it.label, it.hint));
+        .map(|it| KeyHint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }
 
 /// Keys of the list of views, or the letters typed of a name.
-fn of_views(views: &ViewList) -> Vec<Hint> {
+fn of_views(views: &ViewList) -> Vec<KeyHint> {
     match &views.name {
-        Some(name) => vec![Hint { tone: Tone::Strong, ..Hint::new("/", format!("{name}▏")) }],
+        Some(name) => vec![KeyHint { tone: Tone::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
         None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]
-            .map(|(key, words)| Hint::new(key, words))
+            .map(|(key, words)| KeyHint::new(key, words))
             .into(),
     }
 }
@@ -230,13 +230,13 @@ const ELSEWHERE: [Action; 8] = [
     Action::CycleIntegrator,
 ];
 
-fn going_on(hint: Hint, state: &State) -> Hint {
+fn going_on(hint: KeyHint, state: &State) -> KeyHint {
     let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
-    if is_pause && state.work.paused { Hint::new(hint.key, "go on") } else { hint }
+    if is_pause && state.work.paused { KeyHint::new(hint.key, "go on") } else { hint }
 }
 
 /// Errors and warnings that are not in sight.
-fn unseen(state: &State) -> Option<Hint> {
+fn unseen(state: &State) -> Option<KeyHint> {
     let key = keymap::of(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
@@ -246,7 +246,7 @@ fn unseen(state: &State) -> Option<Hint> {
             reported => (summary(&reported), Tone::Warning),
         },
     };
-    Some(Hint { tone, ..Hint::new(key, words) })
+    Some(KeyHint { tone, ..KeyHint::new(key, words) })
 }
 
 fn depth_of_field(state: &State) -> bool {

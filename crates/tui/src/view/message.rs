@@ -7,8 +7,8 @@ use ratatui::layout::Rect;
 use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
+use super::status_line;
 use super::text::{Tone, columns, put, rest, row, wrapped};
-use super::under;
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
@@ -18,7 +18,7 @@ const FACTS: u16 = 10;
 const GAP: u16 = 2;
 
 /// Place of a message.
-enum Spot {
+enum MessagePosition {
     /// In one line.
     Line(Rect),
     /// Over the last rows of these.
@@ -28,12 +28,12 @@ enum Spot {
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let Some((words, tone)) = words(state, layout) else { return };
     let room = match spot(state, layout, &words) {
-        Spot::Line(line) => {
+        MessagePosition::Line(line) => {
             Clear.render(line.intersection(buffer.area), buffer);
             put(buffer, line, &[(&words, tone)], state.display.depth);
             return;
         }
-        Spot::Over(room) => room,
+        MessagePosition::Over(room) => room,
     };
     let lines = wrapped(&words, usize::from(room.width));
     let height = u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height);
@@ -56,9 +56,9 @@ pub(super) fn is_said(state: &State, layout: &Layout) -> bool {
 pub(super) fn left_under(state: &State, layout: &Layout) -> Rect {
     let spot = words(state, layout).map(|(words, _)| spot(state, layout, &words));
     let used = match spot {
-        Some(Spot::Line(line)) if line.y == layout.under.y => line.width + GAP,
-        Some(Spot::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
-        Some(Spot::Line(_) | Spot::Over(_)) | None => 0,
+        Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,
+        Some(MessagePosition::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
+        Some(MessagePosition::Line(_) | MessagePosition::Over(_)) | None => 0,
     };
     rest(layout.under, used)
 }
@@ -66,7 +66,8 @@ pub(super) fn left_under(state: &State, layout: &Layout) -> Rect {
 /// Whether it lies over the image.
 pub(super) fn is_over_picture(state: &State) -> bool {
     let layout = Layout::of(state);
-    words(state, &layout).is_some_and(|(words, _)| matches!(spot(state, &layout, &words), Spot::Over(_)))
+    words(state, &layout)
+        .is_some_and(|(words, _)| matches!(spot(state, &layout, &words), MessagePosition::Over(_)))
 }
 
 /// Whether the panel has room for what was found at a place.
@@ -82,7 +83,8 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
     let words = visible(&message.words).into_owned();
     // The list of views lies where a long one would, and its keys where a short one would without a line of its own.
-    let has_place = !layout.under.is_empty() && matches!(spot(state, layout, &words), Spot::Line(_));
+    let has_place =
+        !layout.under.is_empty() && matches!(spot(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {
         return None;
     }
@@ -90,7 +92,7 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     Some((words, tone))
 }
 
-fn spot(state: &State, layout: &Layout, words: &str) -> Spot {
+fn spot(state: &State, layout: &Layout, words: &str) -> MessagePosition {
     let width = columns(words);
     let under = layout.under;
     if under.is_empty() {
@@ -98,18 +100,22 @@ fn spot(state: &State, layout: &Layout, words: &str) -> Spot {
         let beside = rest(layout.header, super::layout::BLOCK as u16 + 1);
         let line = if layout.keys.is_empty() { beside } else { layout.keys };
         let fits = width <= line.width && !line.is_empty();
-        return if fits { Spot::Line(line) } else { Spot::Over(with_rows_above(layout, line)) };
+        return if fits {
+            MessagePosition::Line(line)
+        } else {
+            MessagePosition::Over(with_rows_above(layout, line))
+        };
     }
-    let needed = match under::least_columns(state, layout) {
+    let needed = match status_line::least_columns(state, layout) {
         0 => 0,
         needed => needed + GAP,
     };
     if width.saturating_add(needed) <= under.width {
-        return Spot::Line(Rect { width, ..under });
+        return MessagePosition::Line(Rect { width, ..under });
     }
     let room = with_rows_above(layout, under);
     let above = Rect { height: room.height.saturating_sub(under.height), ..room };
-    Spot::Over(if needed == 0 || above.is_empty() { room } else { above })
+    MessagePosition::Over(if needed == 0 || above.is_empty() { room } else { above })
 }
 
 /// A line and the rows above it that a longer message may take.

@@ -2,7 +2,7 @@
 
 mod curve;
 pub(super) mod diagnostics;
-mod drawn;
+mod extras;
 mod header;
 pub(super) mod help;
 mod keys;
@@ -12,17 +12,17 @@ mod message;
 mod panel;
 pub(super) mod preview;
 pub(super) mod ramp;
-mod spare;
+mod side_panel;
 mod stages;
+pub(super) mod status_line;
 mod strip;
 mod strip_words;
 pub(super) mod text;
-pub(super) mod under;
 pub(super) mod views;
 
 use ratatui::buffer::Buffer;
 
-pub(super) use self::drawn::Drawn;
+pub(super) use self::extras::ViewExtras;
 use self::layout::Layout;
 use super::state::State;
 
@@ -39,12 +39,12 @@ pub(super) fn picture_at(state: &State, column: u16, row: u16) -> Option<usize> 
 }
 
 /// The whole screen, into a buffer of the window's size.
-pub(super) fn draw(state: &State, buffer: &mut Buffer) -> Drawn {
+pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     let layout = Layout::of(state);
     header::draw(state, &layout, buffer);
     preview::draw(state, layout.preview, buffer);
     let mut drawn = panel::draw(state, layout.panel, buffer);
-    under::draw(state, &layout, message::left_under(state, &layout), buffer, &mut drawn);
+    status_line::draw(state, &layout, message::left_under(state, &layout), buffer, &mut drawn);
     keys::draw(state, &layout, buffer);
     if state.overlays.diagnostics.open {
         diagnostics::draw(state, layout.pane, buffer);
@@ -61,7 +61,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> Drawn {
     let is_covered =
         state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
     if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {
-        Drawn::default()
+        ViewExtras::default()
     } else {
         drawn
     }

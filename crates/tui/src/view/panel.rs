@@ -3,13 +3,13 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::drawn::Drawn;
+use super::extras::ViewExtras;
 use super::layout::{ENTRY_WIDTH, Layout};
 use super::message;
-use super::spare;
-use super::stages::{self, Line};
+use super::side_panel;
+use super::stages::{self, StyledLine};
+use super::status_line;
 use super::text::{Tone, bytes, columns, gauge, percent, row, share, shortened, wrapped};
-use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
@@ -21,13 +21,13 @@ const BAR: u16 = 8;
 const LABEL: usize = 8;
 
 /// In as many columns as there have to be and can be; what does not fit is left out at the end.
-pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> Drawn {
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras {
     if area.is_empty() {
-        return Drawn::default();
+        return ViewExtras::default();
     }
-    let Arranged { lines, columns, room } = arranged(state, area);
+    let PanelLayout { lines, columns, room } = arranged(state, area);
     let width = room.width / columns;
-    let mut drawn = Drawn::default();
+    let mut drawn = ViewExtras::default();
     for (index, line) in (0..).zip(lines.iter()) {
         let (column, line_of) = (index / room.height, index % room.height);
         if column >= columns {
@@ -37,26 +37,26 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> Drawn {
         let place = Rect { x: room.x + column * width, width: width - gap, ..room };
         drawn.put(state, row(place, line_of), line, buffer);
     }
-    drawn.later = spare::draw(state, area, rows(&lines, columns, room), buffer);
+    drawn.later = side_panel::draw(state, area, rows(&lines, columns, room), buffer);
     drawn
 }
 
 /// The picture of the strip at a cell.
 pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
-    let Arranged { lines, columns, room } = arranged(state, area);
-    spare::picture_at(state, area, rows(&lines, columns, room), place)
+    let PanelLayout { lines, columns, room } = arranged(state, area);
+    side_panel::picture_at(state, area, rows(&lines, columns, room), place)
 }
 
 /// Lines in a panel, the number of their columns, and the cells that these may take.
-struct Arranged {
-    lines: Vec<Line>,
+struct PanelLayout {
+    lines: Vec<StyledLine>,
     columns: u16,
     room: Rect,
 }
 
-fn arranged(state: &State, area: Rect) -> Arranged {
-    let room = Rect { width: spare::columns_of_lines(state, area), ..area };
-    let is_one_column = |lines: &[Line]| lines.len() <= usize::from(room.height);
+fn arranged(state: &State, area: Rect) -> PanelLayout {
+    let room = Rect { width: side_panel::columns_of_lines(state, area), ..area };
+    let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
     let mut lines = lines(state, (room.width, room.width), true);
     if !is_one_column(&lines) {
         lines = self::lines(state, (room.width, room.width), false);
@@ -68,16 +68,16 @@ fn arranged(state: &State, area: Rect) -> Arranged {
     }
     let wanted = lines.len().div_ceil(usize::from(room.height.max(1)));
     let columns = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (room.width / ENTRY_WIDTH).max(1));
-    Arranged { lines, columns, room }
+    PanelLayout { lines, columns, room }
 }
 
 /// Rows that lines take; all of them if there are several columns.
-fn rows(lines: &[Line], columns: u16, room: Rect) -> u16 {
+fn rows(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
 /// The lines of a panel of this width, the hint wrapped to a column. With the reasons of stages in full, or with what fits of them beside the stages.
-fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Line> {
+fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, Activity::Done);
     let mut lines = inspected(state, width);
     // The stages and results are not those of an older picture.
@@ -99,13 +99,13 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
 }
 
 /// Facts about a place.
-fn inspected(state: &State, width: u16) -> Vec<Line> {
+fn inspected(state: &State, width: u16) -> Vec<StyledLine> {
     let facts =
         state.selection.facts.iter().filter(|_| message::is_in_panel(state, &Layout::of(state))).flatten();
     let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
-    let mut lines: Vec<Line> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
+    let mut lines: Vec<StyledLine> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
     if !lines.is_empty() {
-        lines.push(Line::new());
+        lines.push(StyledLine::new());
     }
     lines
 }
@@ -119,7 +119,7 @@ fn is_broken(state: &State) -> bool {
     is_at_rest && state.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
 }
 
-fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
+fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     let fraction = stages::fraction(asset);
     let (filled, empty) = gauge(fraction, BAR, state.display.kind == PreviewKind::Ascii);
     let percent = format!(" {:3} %", percent(fraction));
@@ -131,7 +131,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
 }
 
 /// Results in this many columns: a label and a value in each line.
-fn results(state: &State, width: u16) -> Vec<Line> {
+fn results(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
@@ -139,9 +139,9 @@ fn results(state: &State, width: u16) -> Vec<Line> {
     let mut add = |words: &str, tone| {
         lines.extend(wrapped(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
     };
-    under::not_saved(state).iter().for_each(|words| add(words, Tone::Faint));
-    under::lost(state).for_each(|words| add(&words, Tone::Warning));
-    for written in under::files(state) {
+    status_line::not_saved(state).iter().for_each(|words| add(words, Tone::Faint));
+    status_line::lost(state).for_each(|words| add(&words, Tone::Warning));
+    for written in status_line::files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
@@ -168,7 +168,7 @@ fn results(state: &State, width: u16) -> Vec<Line> {
         Some(RenderEnd::Samples) => lines.push(fact("ended by", "samples".to_owned())),
         Some(RenderEnd::Error) | None => {}
     }
-    lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
+    lines.extend(status_line::seen(state).map(|words| vec![(words, Tone::Faint)]));
     lines
 }
 
@@ -195,12 +195,12 @@ fn end(state: &State) -> Option<RenderEnd> {
 }
 
 /// The hint for a user who has not saved yet, broken between words. A broken scene without an image has it in the line below.
-fn hint(state: &State, width: u16) -> Vec<Line> {
+fn hint(state: &State, width: u16) -> Vec<StyledLine> {
     if is_broken(state) && state.picture.shown.is_none() {
         return Vec::new();
     }
     let mut lines: Vec<String> = Vec::new();
-    for word in under::hint(state).split_whitespace() {
+    for word in status_line::hint(state).split_whitespace() {
         match lines.last_mut() {
             Some(line) if columns(line) + 1 + columns(word) <= width => {
                 *line += &format!(" {word}");

@@ -11,8 +11,8 @@ use super::ramp::Ramp;
 use super::text::{Tone, put};
 use crate::color::{ColorDepth, Shades, XTERM};
 use crate::film::Picture;
-use crate::graphics::Placement;
-use crate::history::Shown;
+use crate::graphics::PixelPlacement;
+use crate::history::ShownImage;
 use crate::mosaic::{Grid, fit};
 use crate::options::PreviewChoice;
 use crate::pipeline::protocol::Spot;
@@ -27,8 +27,8 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
         Some(_) if is_in_pixels(state) => {}
         Some(shown) => {
             let kind = in_cells(state.display.kind, state.display.depth);
-            let placed = Placed::of(state, shown, area, kind);
-            placed.draw(&shown.picture, kind, Inks::of(state), buffer);
+            let placed = PlacedImage::of(state, shown, area, kind);
+            placed.draw(&shown.picture, kind, PreviewColors::of(state), buffer);
             marks::draw(state, placed.cells, buffer);
         }
         None if state.overlays.problems.is_none() && area.height > 0 => {
@@ -47,8 +47,8 @@ pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
         let kind = in_cells(state.display.kind, state.display.depth);
-        let placed = Placed::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
-        placed.draw(picture, kind, Inks::of(state), buffer);
+        let placed = PlacedImage::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
+        placed.draw(picture, kind, PreviewColors::of(state), buffer);
     }
 }
 
@@ -56,7 +56,7 @@ pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &
 pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::of(state).preview;
-    let cells = Placed::of(state, shown, area, in_cells(state.display.kind, state.display.depth)).cells;
+    let cells = PlacedImage::of(state, shown, area, in_cells(state.display.kind, state.display.depth)).cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || {
         let spot = Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
@@ -83,32 +83,32 @@ fn is_in_pixels(state: &State) -> bool {
 }
 
 /// Placement of the picture in pixels. `None` if it is drawn in cells.
-pub(crate) fn placement(state: &State, area: Rect) -> Option<Placement> {
+pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
-    let placed = Placed::of(state, shown, area, state.display.kind);
+    let placed = PlacedImage::of(state, shown, area, state.display.kind);
     let (picture, cells) = (shown.picture.clone(), placed.cells);
-    (!cells.is_empty()).then_some(Placement { picture, cells, cell: state.display.window.cell_pixels })
+    (!cells.is_empty()).then_some(PixelPlacement { picture, cells, cell: state.display.window.cell_pixels })
 }
 
-/// Colours that show a picture.
+/// Colors that show a picture.
 #[derive(Clone, Copy)]
-pub(crate) struct Inks<'a> {
+pub(crate) struct PreviewColors<'a> {
     pub(crate) depth: ColorDepth,
     pub(crate) shades: &'a Shades,
     /// Whether the terminal's background is.
     pub(crate) is_light: bool,
 }
 
-impl<'a> Inks<'a> {
+impl<'a> PreviewColors<'a> {
     fn of(state: &'a State) -> Self {
         Self { depth: state.display.depth, shades: &state.display.shades, is_light: state.display.is_light }
     }
 }
 
-/// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colours of xterm.
+/// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colors of xterm.
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
     let shades = Shades::new(depth, &XTERM);
-    let inks = Inks { depth, shades: &shades, is_light: false };
+    let inks = PreviewColors { depth, shades: &shades, is_light: false };
     shown_by(picture, choice, inks, (area, 2.0))
 }
 
@@ -116,12 +116,12 @@ pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: 
 pub(crate) fn shown_by(
     picture: &Picture,
     choice: PreviewChoice,
-    inks: Inks<'_>,
+    inks: PreviewColors<'_>,
     (area, cell_aspect): (Rect, f32),
 ) -> Buffer {
     let mut buffer = Buffer::empty(area);
     let kind = in_cells(PreviewKind::of(choice, inks.depth), inks.depth);
-    Placed::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
+    PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).draw(picture, kind, inks, &mut buffer);
     buffer
 }
 
@@ -134,21 +134,21 @@ pub(crate) fn size_in_cells(
 ) -> (u16, u16) {
     let kind = PreviewKind::of(PreviewChoice::HalfBlock, depth);
     let area = Rect::new(0, 0, columns, rows);
-    let cells = Placed::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
+    let cells = PlacedImage::fit(picture, area, kind, cell_aspect, f32::INFINITY).cells;
     (cells.width, cells.height)
 }
 
 /// Placement of a picture: its cells, and its pixels there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Placed {
+struct PlacedImage {
     cells: Rect,
     width: u32,
     height: u32,
 }
 
-impl Placed {
+impl PlacedImage {
     /// Placement of the state's picture: as large as there is room for, or pixel by pixel.
-    fn of(state: &State, shown: &Shown, area: Rect, kind: PreviewKind) -> Self {
+    fn of(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, Grid::columns);
         let one_to_one = across as f32 / state.display.pixels_across() as f32;
         let most = if shown.section.is_some() { one_to_one } else { f32::INFINITY };
@@ -177,9 +177,9 @@ impl Placed {
         Self { cells, width: u32::from(width), height: u32::from(height) }
     }
 
-    fn draw(self, picture: &Picture, kind: PreviewKind, inks: Inks<'_>, buffer: &mut Buffer) {
+    fn draw(self, picture: &Picture, kind: PreviewKind, inks: PreviewColors<'_>, buffer: &mut Buffer) {
         let pixels = rescaled(picture, self.width, self.height);
-        let scaled = Scaled { width: self.width, height: self.height, pixels: &pixels };
+        let scaled = ScaledImage { width: self.width, height: self.height, pixels: &pixels };
         let mut each = |draw: &dyn Fn(usize, usize, &mut Cell)| {
             for row in 0..self.cells.height {
                 for column in 0..self.cells.width {
@@ -201,21 +201,21 @@ impl Placed {
 }
 
 /// A picture of the size at which it is drawn.
-struct Scaled<'a> {
+struct ScaledImage<'a> {
     width: u32,
     height: u32,
     pixels: &'a [[u8; 3]],
 }
 
-impl Scaled<'_> {
+impl ScaledImage<'_> {
     fn pixel(&self, x: u32, y: u32) -> Option<[u8; 3]> {
         let index = (y < self.height).then(|| y as usize * self.width as usize + x as usize)?;
         self.pixels.get(index).copied()
     }
 }
 
-/// A cell in two colours.
-fn mosaic(scaled: &Scaled<'_>, grid: Grid, shades: &Shades, (x, y): (usize, usize), cell: &mut Cell) {
+/// A cell in two colors.
+fn mosaic(scaled: &ScaledImage<'_>, grid: Grid, shades: &Shades, (x, y): (usize, usize), cell: &mut Cell) {
     let (left, top) = (x as u32 * grid.columns(), y as u32 * grid.rows());
     let part = |i: u32| scaled.pixel(left + i % grid.columns(), top + i / grid.columns());
     let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();
@@ -232,7 +232,13 @@ fn mosaic(scaled: &Scaled<'_>, grid: Grid, shades: &Shades, (x, y): (usize, usiz
 }
 
 /// A cell as a character.
-fn character(scaled: &Scaled<'_>, ramp: Ramp, inks: Inks<'_>, (x, y): (usize, usize), cell: &mut Cell) {
+fn character(
+    scaled: &ScaledImage<'_>,
+    ramp: Ramp,
+    inks: PreviewColors<'_>,
+    (x, y): (usize, usize),
+    cell: &mut Cell,
+) {
     let Some(rgb) = scaled.pixel(x as u32, y as u32) else { return };
     if inks.depth == ColorDepth::None {
         cell.set_char(ramp.glyph(rgb));
@@ -253,8 +259,8 @@ mod tests {
         Picture { width, height, pixels }
     }
 
-    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> Placed {
-        Placed::fit(
+    fn fit(width: u32, height: u32, area: (u16, u16), kind: PreviewKind, aspect: f32) -> PlacedImage {
+        PlacedImage::fit(
             &picture(width, height, |_, _| [0; 3]),
             Rect::new(3, 1, area.0, area.1),
             kind,
@@ -266,11 +272,11 @@ mod tests {
     #[test]
     fn a_picture_of_the_size_asked_for_is_not_scaled() {
         let placed = fit(50, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
-        assert_eq!(placed, Placed { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
+        assert_eq!(placed, PlacedImage { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
         let narrow = fit(20, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
         assert_eq!(narrow.cells, Rect::new(18, 1, 20, 20));
         let odd = fit(50, 31, (50, 20), PreviewKind::HalfBlock, 2.0);
-        assert_eq!(odd, Placed { cells: Rect::new(3, 3, 50, 16), width: 50, height: 31 });
+        assert_eq!(odd, PlacedImage { cells: Rect::new(3, 3, 50, 16), width: 50, height: 31 });
     }
 
     #[test]
@@ -311,10 +317,10 @@ mod tests {
         let one = picture(2, 1, |_, _| [9, 8, 7]);
         let state = state(2, 3);
         let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
-        Placed::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
+        PlacedImage::fit(&one, buffer.area, PreviewKind::HalfBlock, 2.0, f32::INFINITY).draw(
             &one,
             PreviewKind::HalfBlock,
-            Inks::of(&state),
+            PreviewColors::of(&state),
             &mut buffer,
         );
         let cell = &buffer[(0, 1)];
@@ -329,10 +335,10 @@ mod tests {
             [(PreviewKind::Quadrant, "▌"), (PreviewKind::Sextant, "▌"), (PreviewKind::Octant, "▌")]
         {
             let mut buffer = Buffer::empty(Rect::new(0, 0, 4, 2));
-            Placed::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
+            PlacedImage::fit(&sharp, buffer.area, kind, 2.0, f32::INFINITY).draw(
                 &sharp,
                 kind,
-                Inks::of(&state),
+                PreviewColors::of(&state),
                 &mut buffer,
             );
             let cell = &buffer[(1, 1)];

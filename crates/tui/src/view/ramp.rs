@@ -59,12 +59,12 @@ impl Ramp {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
-    /// The character for a colour, if there is only one ink.
+    /// The character for a color, if there is only one ink.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
         self.nearest(self.stretched(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }
 
-    /// The character for a colour and its ink: as saturated as that allows, so that much of it is covered.
+    /// The character for a color and its ink: as saturated as that allows, so that much of it is covered.
     pub(super) fn tinted(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
         let linear = srgb8_to_linear(rgb);
         if self.is_light {
@@ -100,7 +100,7 @@ fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: u
     level.unwrap_or_default() as f32 / 255.0
 }
 
-/// The colour in 5 bits of a channel: what noise changes is not drawn again.
+/// The color in 5 bits of a channel: what noise changes is not drawn again.
 fn coarse(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(|channel| {
         let level = linear_to_srgb8(channel) >> 3;

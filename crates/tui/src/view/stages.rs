@@ -6,7 +6,7 @@ use crate::scene::sanitize::visible;
 use crate::state::{AssetBar, State};
 
 /// Pieces of text with their tones.
-pub(super) type Line = Vec<(String, Tone)>;
+pub(super) type StyledLine = Vec<(String, Tone)>;
 
 /// Stages that took less of the whole time than this are left out of the one line.
 const SMALL: f64 = 0.02;
@@ -16,7 +16,7 @@ const TIME_ENDS: u16 = 16;
 const LEAST_WHY: u16 = 12;
 
 /// Sign, name, time, its change, and the reason; in lines of its own if there is no room beside them.
-pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
+pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = figures(state, stage, room);
     let why = why(state, stage);
     if why.is_empty() {
@@ -32,7 +32,7 @@ pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<Line> {
 }
 
 /// The same in one line, as far as there is room.
-pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<Line> {
+pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = figures(state, stage, room);
     let (why, room) = (why(state, stage), beside(&line, room));
     if !why.is_empty() && (room >= LEAST_WHY || columns(&why) <= room) {
@@ -42,11 +42,11 @@ pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<Line> {
 }
 
 /// Columns for a reason beside a stage.
-fn beside(line: &Line, room: u16) -> u16 {
+fn beside(line: &StyledLine, room: u16) -> u16 {
     room.saturating_sub(width(line) + 2)
 }
 
-fn width(line: &Line) -> u16 {
+fn width(line: &StyledLine) -> u16 {
     line.iter().map(|(text, _)| columns(text)).sum()
 }
 
@@ -56,7 +56,7 @@ fn why(state: &State, stage: Stage) -> String {
 }
 
 /// Sign, name, time, and its change if there is room.
-fn figures(state: &State, stage: Stage, room: u16) -> Line {
+fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.work.is_running();
     let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
@@ -104,7 +104,7 @@ fn change(state: &State, report: &StageReport) -> String {
 
 /// The stages that took a noticeable share of the time, and how many were reused; in short or only the longest one if there is no
 /// room. Empty if not even that fits.
-pub(super) fn in_one_line(state: &State, room: u16) -> Line {
+pub(super) fn in_one_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
     let longest = done().map(|it| it.seconds).fold(0.0, f64::max);
@@ -118,8 +118,8 @@ pub(super) fn in_one_line(state: &State, room: u16) -> Line {
     forms.into_iter().find(|line| width(line) <= room).unwrap_or_default()
 }
 
-fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> Line {
-    let mut line = Line::new();
+fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> StyledLine {
+    let mut line = StyledLine::new();
     let mut reused = 0;
     for report in state.work.stages.iter().flatten() {
         reused += usize::from(report.status == Status::Reused);

@@ -1,7 +1,7 @@
 //! The last pictures as a strip, the newest at its top, each with what changed since the one before.
 
 use super::preview;
-use super::strip_words::{Words, fitting};
+use super::strip_words::{EntryText, fitting};
 use super::text::{Tone, put, rest, row};
 use crate::action::Action;
 use crate::film::Picture;
@@ -12,15 +12,15 @@ use ratatui::layout::Rect;
 
 /// Rows of an entry: of its picture, of all of it, and up to the next one.
 #[derive(Clone, Copy)]
-struct Rows {
+struct EntryRows {
     picture: u16,
     entry: u16,
     pitch: u16,
 }
 
 /// In a narrow strip, a row stays free below the picture, unless the words need it.
-const NARROW_ROWS: Rows = Rows { picture: 3, entry: 4, pitch: 4 };
-const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
+const NARROW_ROWS: EntryRows = EntryRows { picture: 3, entry: 4, pitch: 4 };
+const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
 /// A strip of so many columns is wide.
 const WIDE: u16 = 40;
 /// Columns of the words beside a picture.
@@ -29,11 +29,11 @@ const LEAST_WORDS: u16 = 10;
 const COLUMN: u16 = 44;
 
 /// A picture of the strip and its place.
-struct Item {
+struct StripEntry {
     /// Index among the pictures that are kept.
     index: usize,
     cells: Rect,
-    rows: Rows,
+    rows: EntryRows,
 }
 
 /// Draws it at the bottom of an area.
@@ -54,7 +54,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buffer) {
+fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buffer: &mut Buffer) {
     let history = &state.picture.history;
     let Some(picture) = history.small(*index) else { return };
     let place = Rect { height: rows.picture, ..*cells };
@@ -63,7 +63,7 @@ fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buf
     let is_looked_at = history.looked_at() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
     // The words stand beside the picture alone, and in the same columns with and without a mark.
-    let words = Words {
+    let words = EntryText {
         head: format!("{mark}{} ", number(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
     };
@@ -100,7 +100,7 @@ pub(super) fn rows(state: &State, area: Rect) -> u16 {
 }
 
 /// The pictures that have room, at the bottom of an area: the newest at the top, and of older ones the one that is looked at.
-fn items(state: &State, area: Rect) -> Vec<Item> {
+fn items(state: &State, area: Rect) -> Vec<StripEntry> {
     let count = state.picture.history.len();
     let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
     let columns = (area.width / COLUMN).max(1);
@@ -123,12 +123,13 @@ fn items(state: &State, area: Rect) -> Vec<Item> {
         let y = area.bottom() + gap - (high - line) * rows.pitch;
         Rect { x: area.x + column * width, y, width: width - beside, height: rows.entry }
     };
-    let item = |number: usize| Item { index: first + shown - 1 - number, cells: place(number as u16), rows };
+    let item =
+        |number: usize| StripEntry { index: first + shown - 1 - number, cells: place(number as u16), rows };
     (0..shown).map(item).collect()
 }
 
 /// The picture of the strip in this area at a cell.
 pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
-    let is_there = |item: &Item| item.cells.contains((column, row).into());
+    let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
     items(state, area).into_iter().find(is_there).map(|item| item.index)
 }

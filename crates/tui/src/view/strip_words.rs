@@ -5,7 +5,7 @@ use unicode_width::UnicodeWidthStr;
 use crate::scene::{key_parts, shortened_key, split_key};
 
 /// Words beside a picture.
-pub(super) struct Words {
+pub(super) struct EntryText {
     /// The mark and the number, with a blank behind them.
     pub(super) head: String,
     /// Changes since the picture before.
@@ -14,7 +14,7 @@ pub(super) struct Words {
 
 /// Parts of a change to tell, from most to fewest.
 #[derive(Clone, Copy)]
-enum Form {
+enum ChangeForm {
     /// The key with its old and its new value.
     Full,
     /// The key with its new value.
@@ -28,22 +28,23 @@ enum Form {
 }
 
 /// Lines of a width: in the first number of rows if that is enough, else in the second. The last line has what is too much.
-pub(super) fn fitting(words: &Words, width: usize, rows: [usize; 2]) -> Vec<String> {
+pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
-    let all = [Form::Full, Form::New, Form::Short];
+    let all = [ChangeForm::Full, ChangeForm::New, ChangeForm::Short];
     let count = words.changes.len();
-    let fewer = (1..count).rev().map(Form::First).chain([Form::Cut]);
+    let fewer = (1..count).rev().map(ChangeForm::First).chain([ChangeForm::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
     let lines = |form| filled(&words.head, &pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
-    let fits = |(form, rows): (Form, usize)| {
+    let fits = |(form, rows): (ChangeForm, usize)| {
         let lines = lines(form);
         let is_whole = lines.iter().all(|line| line.width() <= width);
         (lines.len() <= rows && is_whole && !is_lone(&lines)).then_some(lines)
     };
-    let mut lines = in_few.into_iter().chain(in_most).find_map(fits).unwrap_or_else(|| lines(Form::Cut));
+    let mut lines =
+        in_few.into_iter().chain(in_most).find_map(fits).unwrap_or_else(|| lines(ChangeForm::Cut));
     if lines.len() > most {
         let rest = lines.split_off(most.saturating_sub(1)).join(" ");
         lines.push(rest);
@@ -52,34 +53,34 @@ pub(super) fn fitting(words: &Words, width: usize, rows: [usize; 2]) -> Vec<Stri
 }
 
 /// Pieces of the changes that stay whole if they fit into a line.
-fn pieces(words: &Words, form: Form, width: usize) -> Vec<Piece> {
+fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
-        Form::Full | Form::New | Form::Short => changes.len(),
-        Form::First(told) => told,
-        Form::Cut => 1,
+        ChangeForm::Full | ChangeForm::New | ChangeForm::Short => changes.len(),
+        ChangeForm::First(told) => told,
+        ChangeForm::Cut => 1,
     };
     let mut pieces = Vec::new();
     for (number, change) in (1..).zip(changes.iter().take(told)) {
         pieces.extend(of_change(change, form, width.saturating_sub(words.head.width())));
         let end = if number < told { ";" } else { "" };
-        if let Some(Piece { text, .. }) = pieces.last_mut() {
+        if let Some(ChangePiece { text, .. }) = pieces.last_mut() {
             *text += end;
         }
     }
     if told < changes.len() {
-        pieces.push(Piece::words("…"));
+        pieces.push(ChangePiece::words("…"));
     }
     pieces
 }
 
 /// A piece of a change that stays in one line if it fits.
-struct Piece {
+struct ChangePiece {
     text: String,
     is_key: bool,
 }
 
-impl Piece {
+impl ChangePiece {
     fn words(text: impl Into<String>) -> Self {
         Self { text: text.into(), is_key: false }
     }
@@ -98,13 +99,13 @@ impl Piece {
 }
 
 /// Pieces of one change: the key, its values; or single words.
-fn of_change(change: &str, form: Form, beside_head: usize) -> Vec<Piece> {
-    let words = |text: &str| text.split(' ').map(Piece::words).collect::<Vec<_>>();
-    let key = |key: &str| Piece { text: in_form(key, form, beside_head), is_key: true };
+fn of_change(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePiece> {
+    let words = |text: &str| text.split(' ').map(ChangePiece::words).collect::<Vec<_>>();
+    let key = |key: &str| ChangePiece { text: in_form(key, form, beside_head), is_key: true };
     if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
         let (name, value) = split_key(rest).unwrap_or((rest, ""));
         let value = if value.is_empty() { Vec::new() } else { words(value) };
-        return [Piece::words(sign), key(name)].into_iter().chain(value).collect();
+        return [ChangePiece::words(sign), key(name)].into_iter().chain(value).collect();
     }
     let of_key = split_key(change).filter(|_| !change.starts_with("line "));
     let Some((name, old, new)) = of_key.and_then(|(name, values)| {
@@ -113,18 +114,18 @@ fn of_change(change: &str, form: Form, beside_head: usize) -> Vec<Piece> {
     }) else {
         return words(change);
     };
-    let new = Piece::words(format!("→ {new}"));
+    let new = ChangePiece::words(format!("→ {new}"));
     match form {
-        Form::Full => vec![key(name), Piece::words(old), new],
-        Form::New | Form::Short | Form::First(_) | Form::Cut => vec![key(name), new],
+        ChangeForm::Full => vec![key(name), ChangePiece::words(old), new],
+        ChangeForm::New | ChangeForm::Short | ChangeForm::First(_) | ChangeForm::Cut => vec![key(name), new],
     }
 }
 
-fn in_form(key: &str, form: Form, beside_head: usize) -> String {
+fn in_form(key: &str, form: ChangeForm, beside_head: usize) -> String {
     match form {
-        Form::Full | Form::New => key.to_owned(),
-        Form::Short | Form::First(_) => last_parts(key),
-        Form::Cut => shortened_key(&last_parts(key), beside_head),
+        ChangeForm::Full | ChangeForm::New => key.to_owned(),
+        ChangeForm::Short | ChangeForm::First(_) => last_parts(key),
+        ChangeForm::Cut => shortened_key(&last_parts(key), beside_head),
     }
 }
 
@@ -138,7 +139,7 @@ fn last_parts(key: &str) -> String {
 
 /// Puts pieces into lines behind a head. Pieces that are too long for a line are broken: keys behind a point, all else between
 /// words.
-fn filled(head: &str, pieces: &[Piece], width: usize) -> Vec<String> {
+fn filled(head: &str, pieces: &[ChangePiece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
     for piece in pieces {
@@ -166,7 +167,7 @@ mod tests {
 
     fn lines(number: &str, changes: &[&str], width: usize) -> Vec<String> {
         let changes = changes.iter().map(|change| (*change).to_owned()).collect();
-        fitting(&Words { head: format!("{number} "), changes }, width, [3, 4])
+        fitting(&EntryText { head: format!("{number} "), changes }, width, [3, 4])
     }
 
     #[test]

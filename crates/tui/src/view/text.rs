@@ -1,4 +1,4 @@
-//! Text for cells: styles that do without colour, amounts in words.
+//! Text for cells: styles that do without color, amounts in words.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use crate::color::ColorDepth;
 pub(super) use crate::pipeline::words::seconds;
 
-/// Role of a piece of text. The colours are those of the terminal's own palette of 16, which follow its theme.
+/// Role of a piece of text. The colors are those of the terminal's own palette of 16, which follow its theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
@@ -29,7 +29,7 @@ pub(super) enum Tone {
 }
 
 impl Tone {
-    /// Its style; without colours, modifiers alone.
+    /// Its style; without colors, modifiers alone.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
             Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
@@ -46,7 +46,7 @@ impl Tone {
         Style::new().fg(color).bg(Color::Reset).add_modifier(modifier)
     }
 
-    /// The same as a block of colour, black or white on it, whichever every theme can read; without colours reversed.
+    /// The same as a block of color, black or white on it, whichever every theme can read; without colors reversed.
     pub(super) fn block(self, depth: ColorDepth) -> Style {
         let (fg, bg) = match self {
             _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
@@ -58,7 +58,7 @@ impl Tone {
                 (Color::Reset, Color::Reset)
             }
         };
-        // Bold black is grey in xterm and others, which draw bold by the brighter half of the palette.
+        // Bold black is gray in xterm and others, which draw bold by the brighter half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
         let modifier = if bg == Color::Reset { reversed } else { Modifier::empty() };
         Style::new().fg(fg).bg(bg).add_modifier(modifier)
@@ -252,9 +252,9 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 mod tests {
     use super::*;
 
-    /// xterm draws bold black as grey.
+    /// xterm draws bold black as gray.
     #[test]
-    fn nothing_on_a_block_of_colour_is_bold() {
+    fn nothing_on_a_block_of_color_is_bold() {
         for tone in [Tone::Working, Tone::Good, Tone::Warning, Tone::Error] {
             let style = tone.block(ColorDepth::TrueColor);
             assert!(!style.add_modifier.contains(Modifier::BOLD), "{tone:?}");

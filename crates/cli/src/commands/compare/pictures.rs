@@ -10,7 +10,7 @@ use crate::console::Console;
 use crate::film::RadianceImage;
 use crate::film::tone::{ToneMapping, develop};
 use crate::scene::sanitize::visible;
-use crate::tui::{Named, printed};
+use crate::tui::{NamedImage, images_as_text};
 
 /// Less FLIP than this is hardly seen in its colours.
 const FAINT: f32 = 0.1;
@@ -32,7 +32,7 @@ pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> Str
         named(&format!("{}, the reference", name(&args.b)), pair.b()),
         named(&words, &difference),
     ];
-    printed(&pictures, args.color, is_terminal)
+    images_as_text(&pictures, args.color, is_terminal)
 }
 
 pub(super) fn show(lines: &str, console: &Console) {
@@ -46,8 +46,8 @@ fn name(path: &Path) -> String {
 }
 
 /// An image as a display shows it, with its name.
-fn named(name: &str, image: &RadianceImage) -> Named {
-    Named { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
+fn named(name: &str, image: &RadianceImage) -> NamedImage {
+    NamedImage { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
 }
 
 /// FLIP in colours; if that is all but black, |a - b| as bright as it can be shown.

@@ -43,22 +43,22 @@ fn grainy(x: u16, y: u16, seed: u32, grain: i32) -> [u8; 3] {
 const SIDE: (u16, u16) = (60, 24);
 const CELLS: usize = SIDE.0 as usize * SIDE.1 as usize;
 
-fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> Desk {
-    let mut desk = Desk::new(buffer.area.width, buffer.area.height, ColorDepth::TrueColor);
-    desk.painter.aim(buffer, picture, fidelity);
-    desk.finish(4096);
-    desk
+fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
+    let mut ui = TestTerminal::new(buffer.area.width, buffer.area.height, ColorDepth::TrueColor);
+    ui.painter.aim(buffer, picture, fidelity);
+    ui.finish(4096);
+    ui
 }
 
 #[test]
 fn a_first_picture_takes_12_bytes_a_cell_whatever_it_shows() {
     for (grain, most) in [(0, 16), (5, 30), (20, 120), (60, 255), (255, 255)] {
         let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, grain));
-        let desk = showing(&buffer, picture, Fidelity::First);
+        let ui = showing(&buffer, picture, Fidelity::First);
         // Clearing the screen and the words.
         let others = 40;
-        assert!(desk.sent <= 12 * CELLS + others, "grain {grain}: {} bytes a cell", desk.sent / CELLS);
-        let largest = desk.difference(&buffer, ColorDepth::TrueColor);
+        assert!(ui.sent <= 12 * CELLS + others, "grain {grain}: {} bytes a cell", ui.sent / CELLS);
+        let largest = ui.difference(&buffer, ColorDepth::TrueColor);
         assert!(largest <= most, "grain {grain}: off by {largest}");
     }
 }
@@ -66,14 +66,14 @@ fn a_first_picture_takes_12_bytes_a_cell_whatever_it_shows() {
 #[test]
 fn noise_under_the_threshold_is_not_sent() {
     let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 0));
-    let mut desk = showing(&buffer, picture, Fidelity::Still);
+    let mut ui = showing(&buffer, picture, Fidelity::Still);
     for seed in 2..6 {
         let (noisy, _) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, seed, 2));
-        desk.painter.aim(&noisy, picture, Fidelity::Moving);
-        assert_eq!(desk.finish(4096), 0);
+        ui.painter.aim(&noisy, picture, Fidelity::Moving);
+        assert_eq!(ui.finish(4096), 0);
     }
-    desk.painter.aim(&buffer, picture, Fidelity::Still);
-    assert_eq!(desk.finish(4096), 0, "nothing is to be put right");
+    ui.painter.aim(&buffer, picture, Fidelity::Still);
+    assert_eq!(ui.finish(4096), 0, "nothing is to be put right");
 }
 
 /// Inside this rectangle of cells the scene of a test changes.
@@ -89,10 +89,10 @@ fn an_edit_sends_nothing_of_what_it_did_not_change() {
     let picture_of =
         |seed, grain, is_edited| pictured(SIDE.0, SIDE.1, |x, y| edited(x, y, seed, grain, is_edited));
     let (first, picture) = picture_of(1, 40, false);
-    let mut desk = showing(&first, picture, Fidelity::First);
-    desk.painter.aim(&picture_of(9, 0, false).0, picture, Fidelity::Still);
-    desk.finish(4096);
-    let before: Vec<Look> = on_screen(&desk, picture);
+    let mut ui = showing(&first, picture, Fidelity::First);
+    ui.painter.aim(&picture_of(9, 0, false).0, picture, Fidelity::Still);
+    ui.finish(4096);
+    let before: Vec<CellContent> = on_screen(&ui, picture);
 
     // The same noise at one sample, then less and less of others.
     let mut sent = 0;
@@ -103,47 +103,47 @@ fn an_edit_sends_nothing_of_what_it_did_not_change() {
         (9, 0, Fidelity::Still),
     ] {
         let (buffer, _) = picture_of(seed, grain, true);
-        desk.painter.aim(&buffer, picture, fidelity);
-        sent += desk.finish(4096);
-        for (i, (old, new)) in before.iter().zip(on_screen(&desk, picture)).enumerate() {
+        ui.painter.aim(&buffer, picture, fidelity);
+        sent += ui.finish(4096);
+        for (i, (old, new)) in before.iter().zip(on_screen(&ui, picture)).enumerate() {
             let (x, y) = (i as u16 % picture.width + picture.x, i as u16 / picture.width + picture.y);
             assert!(CHANGED.contains((x, y).into()) || *old == new, "{x},{y} at {fidelity:?}");
         }
     }
-    assert_eq!(desk.difference(&picture_of(9, 0, true).0, ColorDepth::TrueColor).max(1), 1);
+    assert_eq!(ui.difference(&picture_of(9, 0, true).0, ColorDepth::TrueColor).max(1), 1);
     let cells = usize::from(CHANGED.width * CHANGED.height);
     assert!(sent <= 100 * cells, "{} bytes a cell", sent / cells);
 
     // And back again, where the screen shows the edit.
-    desk.painter.aim(&first, picture, Fidelity::First);
-    desk.finish(4096);
-    for (i, (old, new)) in before.iter().zip(on_screen(&desk, picture)).enumerate() {
+    ui.painter.aim(&first, picture, Fidelity::First);
+    ui.finish(4096);
+    for (i, (old, new)) in before.iter().zip(on_screen(&ui, picture)).enumerate() {
         let (x, y) = (i as u16 % picture.width + picture.x, i as u16 / picture.width + picture.y);
         assert!(CHANGED.contains((x, y).into()) || *old == new, "{x},{y} on the way back");
     }
-    let changed_back = on_screen(&desk, CHANGED);
-    desk.painter.aim(&picture_of(9, 0, true).0, picture, Fidelity::Still);
-    desk.finish(4096);
-    assert_ne!(changed_back, on_screen(&desk, CHANGED), "the edit was taken back on the screen");
+    let changed_back = on_screen(&ui, CHANGED);
+    ui.painter.aim(&picture_of(9, 0, true).0, picture, Fidelity::Still);
+    ui.finish(4096);
+    assert_ne!(changed_back, on_screen(&ui, CHANGED), "the edit was taken back on the screen");
 }
 
-fn on_screen(desk: &Desk, area: Rect) -> Vec<Look> {
+fn on_screen(ui: &TestTerminal, area: Rect) -> Vec<CellContent> {
     let places = (area.top()..area.bottom()).flat_map(|y| (area.left()..area.right()).map(move |x| (x, y)));
-    places.map(|(x, y)| shown(desk.terminal.screen().cell(y, x).expect("a cell"))).collect()
+    places.map(|(x, y)| shown(ui.terminal.screen().cell(y, x).expect("a cell"))).collect()
 }
 
 #[test]
 fn aims_that_come_faster_than_they_are_drawn_lead_to_the_edge() {
     let picture_of = |seed| pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, seed, 60));
-    let mut desk = Desk::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
+    let mut ui = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for seed in 0..16 {
         let (buffer, picture) = picture_of(seed);
-        desk.painter.aim(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
+        ui.painter.aim(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
         // About three rows of such noise.
-        desk.slice(3 * 40 * usize::from(SIDE.0));
+        ui.slice(3 * 40 * usize::from(SIDE.0));
     }
-    let looks = on_screen(&desk, Rect::new(1, 0, SIDE.0, SIDE.1));
-    let blank = looks.iter().filter(|look| **look == Look::BLANK).count();
+    let looks = on_screen(&ui, Rect::new(1, 0, SIDE.0, SIDE.1));
+    let blank = looks.iter().filter(|look| **look == CellContent::BLANK).count();
     assert_eq!(blank, 0, "cells that were never drawn");
 }
 
@@ -151,27 +151,27 @@ fn aims_that_come_faster_than_they_are_drawn_lead_to_the_edge() {
 fn words_that_change_during_a_picture_do_not_hold_it_up() {
     let (mut buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 5));
     let whole = showing(&buffer, picture, Fidelity::First).sent;
-    let mut desk = Desk::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
+    let mut ui = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for step in 0..40 {
         buffer.set_string(0, SIDE.1, format!("{step:02}"), ratatui::style::Style::new());
-        desk.painter.aim(&buffer, picture, Fidelity::First);
-        desk.slice(whole / 20);
+        ui.painter.aim(&buffer, picture, Fidelity::First);
+        ui.slice(whole / 20);
     }
-    desk.finish(4096);
-    assert!(desk.sent < whole + 40 * 80, "{} bytes in place of {whole}", desk.sent);
-    let looks = on_screen(&desk, picture);
-    assert!(!looks.contains(&Look::BLANK), "cells that were never drawn");
+    ui.finish(4096);
+    assert!(ui.sent < whole + 40 * 80, "{} bytes in place of {whole}", ui.sent);
+    let looks = on_screen(&ui, picture);
+    assert!(!looks.contains(&CellContent::BLANK), "cells that were never drawn");
 }
 
 #[test]
 fn a_picture_under_words_comes_back_when_they_go() {
     let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 5));
-    let mut desk = showing(&buffer, picture, Fidelity::Still);
+    let mut ui = showing(&buffer, picture, Fidelity::Still);
     let mut covered = buffer.clone();
     covered.set_string(8, 4, "日本 x", ratatui::style::Style::reset());
     for wanted in [&covered, &buffer] {
-        desk.painter.aim(wanted, picture, Fidelity::Still);
-        assert!(desk.finish(4096) < 400);
-        assert!(desk.difference(wanted, ColorDepth::TrueColor) <= 1);
+        ui.painter.aim(wanted, picture, Fidelity::Still);
+        assert!(ui.finish(4096) < 400);
+        assert!(ui.difference(wanted, ColorDepth::TrueColor) <= 1);
     }
 }

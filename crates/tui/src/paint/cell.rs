@@ -4,17 +4,17 @@ use ratatui::buffer::Cell;
 use ratatui::style::Modifier;
 use unicode_width::UnicodeWidthStr;
 
-use super::pen::{Pen, Wish};
-use super::shade::{Layer, Shade};
+use super::pen::{Pen, PenRequirements};
+use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
 use crate::mosaic::{PLACES, Tile, of_symbol};
 
 /// One cell of the screen.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Look {
+pub(super) enum CellContent {
     /// Nobody knows.
     Unknown,
-    /// Two colours, and which part of it has which: a blank is two halves of one colour.
+    /// Two colors, and which part of it has which: a blank is two halves of one color.
     Mosaic(Mosaic),
     /// A character.
     Text(Text),
@@ -22,31 +22,31 @@ pub(super) enum Look {
     Covered,
 }
 
-/// A cell of two colours.
+/// A cell of two colors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mosaic {
     pub(super) tile: Tile,
     /// Shades of the first and of the second part.
-    pub(super) pair: [Shade; 2],
+    pub(super) pair: [TerminalColor; 2],
 }
 
 impl Mosaic {
     /// Whatever looks the same is the same.
-    pub(super) fn new(tile: Tile, pair: [Shade; 2]) -> Self {
+    pub(super) fn new(tile: Tile, pair: [TerminalColor; 2]) -> Self {
         Self { tile: if pair[0] == pair[1] { Tile::HALVES } else { tile }, pair }
     }
 
-    pub(super) fn halves(pair: [Shade; 2]) -> Self {
+    pub(super) fn halves(pair: [TerminalColor; 2]) -> Self {
         Self { tile: Tile::HALVES, pair }
     }
 
-    /// One colour.
-    pub(super) fn plain(shade: Shade) -> Self {
+    /// One color.
+    pub(super) fn plain(shade: TerminalColor) -> Self {
         Self::halves([shade; 2])
     }
 
     /// The mosaic of a character. `None` for a character without blocks.
-    fn of(symbol: &str, fg: Shade, bg: Shade) -> Option<Self> {
+    fn of(symbol: &str, fg: TerminalColor, bg: TerminalColor) -> Option<Self> {
         match symbol {
             " " => return Some(Self::plain(bg)),
             "█" => return Some(Self::plain(fg)),
@@ -57,7 +57,7 @@ impl Mosaic {
     }
 
     /// Pairs of shades that meet in this cell and in the other, with the share of the cell, of 2, where they do.
-    pub(super) fn against(self, other: Self) -> impl Iterator<Item = (Shade, Shade, f32)> {
+    pub(super) fn against(self, other: Self) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
         let shared = self.tile.shared(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
         pairs.filter(move |(own, its)| shared[*own][*its] > 0).map(move |(own, its)| {
@@ -83,7 +83,7 @@ impl Text {
     }
 }
 
-/// The four ways to fill the two parts of a cell by the two colours of the pen.
+/// The four ways to fill the two parts of a cell by the two colors of the pen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glyph {
     Blank,
@@ -113,47 +113,48 @@ impl Glyph {
     }
 
     /// Layers that fill the first and the second part.
-    pub(super) fn layers(self) -> [Layer; 2] {
+    pub(super) fn layers(self) -> [ColorLayer; 2] {
         match self {
-            Self::Blank => [Layer::Background; 2],
-            Self::First => [Layer::Foreground, Layer::Background],
-            Self::Second => [Layer::Background, Layer::Foreground],
-            Self::Full => [Layer::Foreground; 2],
+            Self::Blank => [ColorLayer::Background; 2],
+            Self::First => [ColorLayer::Foreground, ColorLayer::Background],
+            Self::Second => [ColorLayer::Background, ColorLayer::Foreground],
+            Self::Full => [ColorLayer::Foreground; 2],
         }
     }
 
-    /// The wish to the pen; it leaves out colours that the mosaic does not show.
-    pub(super) fn wish(self, pair: [Shade; 2]) -> Wish {
+    /// The wish to the pen; it leaves out colors that the mosaic does not show.
+    pub(super) fn wish(self, pair: [TerminalColor; 2]) -> PenRequirements {
         let color =
             |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
         let matters = if self == Self::Blank { ON_BLANKS } else { Modifier::all() };
-        Wish {
-            fg: color(Layer::Foreground),
-            bg: color(Layer::Background),
+        PenRequirements {
+            fg: color(ColorLayer::Foreground),
+            bg: color(ColorLayer::Background),
             modifier: Modifier::empty(),
             matters,
             link: 0,
         }
     }
 
-    /// Whether it can show these colours.
-    pub(super) fn shows(self, pair: [Shade; 2]) -> bool {
+    /// Whether it can show these colors.
+    pub(super) fn shows(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.layers();
         pair[0].fits(first) && pair[1].fits(second) && (first != second || pair[0] == pair[1])
     }
 }
 
-impl Look {
+impl CellContent {
     /// A blank of the terminal's own background.
-    pub(super) const BLANK: Self = Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [Shade::Ground; 2] });
+    pub(super) const BLANK: Self =
+        Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::Ground; 2] });
 
     /// The look of a cell on a terminal of this depth.
     pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
         let shade = |color, layer| {
             let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };
-            Shade::of(color, layer)
+            TerminalColor::of(color, layer)
         };
-        let (fg, bg) = (shade(cell.fg, Layer::Foreground), shade(cell.bg, Layer::Background));
+        let (fg, bg) = (shade(cell.fg, ColorLayer::Foreground), shade(cell.bg, ColorLayer::Background));
         let (symbol, columns) = printable(cell.symbol());
         let harmless = if symbol == " " { Modifier::all() - ON_BLANKS } else { Modifier::empty() };
         let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::of(symbol, fg, bg)).flatten();
@@ -194,11 +195,11 @@ mod tests {
 
     use super::*;
 
-    fn look(symbol: &str, fg: Color, bg: Color, modifier: Modifier) -> Look {
+    fn look(symbol: &str, fg: Color, bg: Color, modifier: Modifier) -> CellContent {
         let mut cell = Cell::default();
         cell.set_symbol(symbol).set_fg(fg).set_bg(bg);
         cell.modifier = modifier;
-        Look::of(&cell, ColorDepth::TrueColor)
+        CellContent::of(&cell, ColorDepth::TrueColor)
     }
 
     #[test]
@@ -222,7 +223,7 @@ mod tests {
         for symbol in ["", "\n", "\x1b[2J", "\u{301}", "a\x07"] {
             assert_eq!(
                 look(symbol, Color::Reset, Color::Reset, Modifier::empty()),
-                Look::BLANK,
+                CellContent::BLANK,
                 "{symbol:?}"
             );
         }
@@ -231,10 +232,10 @@ mod tests {
     }
 
     #[test]
-    fn without_colours_there_are_none() {
+    fn without_colors_there_are_none() {
         let mut cell = Cell::default();
         cell.set_symbol("x").set_fg(Color::Red).set_bg(Color::Blue);
-        let Look::Text(text) = Look::of(&cell, ColorDepth::None) else { panic!("a character") };
-        assert_eq!((text.pen.fg, text.pen.bg), (Shade::Ink, Shade::Ground));
+        let CellContent::Text(text) = CellContent::of(&cell, ColorDepth::None) else { panic!("a character") };
+        assert_eq!((text.pen.fg, text.pen.bg), (TerminalColor::Ink, TerminalColor::Ground));
     }
 }

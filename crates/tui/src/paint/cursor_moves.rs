@@ -1,17 +1,17 @@
 //! Moves of the cursor in few bytes.
 
-use super::shade::push_number;
+use super::terminal_color::push_number;
 
 /// A cell: column and row, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct CellPosition {
     pub(super) x: u16,
     pub(super) y: u16,
 }
 
 /// Appends the shortest move. `from` is none where the cursor may be anywhere, as after a character in the last column.
 /// None of the moves scrolls, wraps or depends on modes.
-pub(super) fn go(from: Option<Place>, to: Place, out: &mut Vec<u8>) {
+pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>) {
     let Some(from) = from else { return absolute(to, out) };
     if from == to {
         return;
@@ -42,7 +42,7 @@ pub(super) fn go(from: Option<Place>, to: Place, out: &mut Vec<u8>) {
 }
 
 /// CUP.
-fn absolute(to: Place, out: &mut Vec<u8>) {
+fn absolute(to: CellPosition, out: &mut Vec<u8>) {
     out.extend_from_slice(b"\x1b[");
     if to.y > 0 || to.x > 0 {
         push_number(to.y + 1, out);
@@ -87,7 +87,7 @@ mod tests {
 
     fn moved(from: (u16, u16), to: (u16, u16)) -> String {
         let mut out = Vec::new();
-        go(Some(Place { x: from.0, y: from.1 }), Place { x: to.0, y: to.1 }, &mut out);
+        go(Some(CellPosition { x: from.0, y: from.1 }), CellPosition { x: to.0, y: to.1 }, &mut out);
         String::from_utf8(out).expect("ASCII")
     }
 
@@ -110,10 +110,10 @@ mod tests {
             let side = |length| std::num::NonZero::new(length).expect("not zero");
             let mut parser = vt100::Parser::new(side(40), side(120), 0);
             let (mut start, mut out) = (Vec::new(), Vec::new());
-            let from = Place { x: from.0, y: from.1 };
+            let from = CellPosition { x: from.0, y: from.1 };
             absolute(from, &mut start);
             parser.process(&start);
-            go(known.then_some(from), Place { x: to.0, y: to.1 }, &mut out);
+            go(known.then_some(from), CellPosition { x: to.0, y: to.1 }, &mut out);
             parser.process(&out);
             prop_assert_eq!(parser.screen().cursor_position(), (to.1, to.0));
             prop_assert!(out.len() <= "\x1b[40;120H".len());

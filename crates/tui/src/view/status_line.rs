@@ -3,7 +3,7 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::drawn::Drawn;
+use super::extras::ViewExtras;
 use super::layout::Layout;
 use super::stages::{self, at_work};
 use super::text::{
@@ -15,7 +15,7 @@ use crate::pipeline::words::samples_so_far;
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
-use crate::state::{Activity, OwnImage, State, Written};
+use crate::state::{Activity, OwnImage, State, WrittenFile};
 
 /// The hint in a narrow window.
 const SHORT_HINT: &str = "save it to render again";
@@ -24,53 +24,55 @@ const SHORT_HINT_OF_MODEL: &str = "rendered again on changes";
 const LEAST_BAR: u16 = 6;
 
 /// Draws it in the part of the line that a message leaves.
-pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut Drawn) {
+pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     match content(state) {
-        Content::Nothing => {}
-        Content::Bar => bar(state, layout, area, buffer),
-        Content::Summary => summary(state, layout, area, buffer, drawn),
-        Content::Words(words) => {
+        StatusContent::Nothing => {}
+        StatusContent::ProgressBar => bar(state, layout, area, buffer),
+        StatusContent::Summary => summary(state, layout, area, buffer, drawn),
+        StatusContent::Words(words) => {
             put(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
         }
     }
 }
 
 /// Content of the line.
-enum Content {
+enum StatusContent {
     Nothing,
-    Bar,
+    ProgressBar,
     Summary,
     Words(String),
 }
 
-fn content(state: &State) -> Content {
+fn content(state: &State) -> StatusContent {
     // What the newest picture took says nothing of an older one.
     if state.picture.history.is_open() && !state.work.is_running() {
-        return Content::Nothing;
+        return StatusContent::Nothing;
     }
     match state.work.activity {
-        Activity::Running { .. } => Content::Bar,
-        Activity::Done => Content::Summary,
-        Activity::Waiting | Activity::Cancelled => Content::Nothing,
+        Activity::Running { .. } => StatusContent::ProgressBar,
+        Activity::Done => StatusContent::Summary,
+        Activity::Waiting | Activity::Cancelled => StatusContent::Nothing,
         Activity::Broken if let Some(progress) = goes_on(state) => {
-            Content::Words(format!("the last good scene goes on: {} %", percent(progress.fraction)))
+            StatusContent::Words(format!("the last good scene goes on: {} %", percent(progress.fraction)))
         }
         Activity::Broken if state.picture.shown.is_some() => {
             let until =
                 if state.overlays.is_scene_missing() { "the file is back" } else { "the errors are fixed" };
-            Content::Words(format!("the last good picture stays until {until}"))
+            StatusContent::Words(format!("the last good picture stays until {until}"))
         }
-        Activity::Broken => Content::Words(hint(state)),
+        Activity::Broken => StatusContent::Words(hint(state)),
     }
 }
 
 /// Columns that a message leaves for the rest of the line.
 pub(super) fn least_columns(state: &State, layout: &Layout) -> u16 {
     match content(state) {
-        Content::Nothing => 0,
-        Content::Bar => columns(&bar_words(state, layout).1),
-        Content::Summary => file_pieces(state, layout).iter().flatten().map(|(text, _)| columns(text)).sum(),
-        Content::Words(words) => columns(&words),
+        StatusContent::Nothing => 0,
+        StatusContent::ProgressBar => columns(&bar_words(state, layout).1),
+        StatusContent::Summary => {
+            file_pieces(state, layout).iter().flatten().map(|(text, _)| columns(text)).sum()
+        }
+        StatusContent::Words(words) => columns(&words),
     }
 }
 
@@ -131,7 +133,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 }
 
 /// Draws the stages in one line, and the other facts that the panel does not show.
-fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut Drawn) {
+fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     let of_files = file_pieces(state, layout);
     // The files come first where there is not room for everything.
     let room = area.width.saturating_sub(least_columns(state, layout));
@@ -176,7 +178,7 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
 
 /// Name and size of each written file, if the panel does not list them.
 fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
-    let pieces = |written: &Written| {
+    let pieces = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         let size = format!(" {}", bytes(written.bytes));
         vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]
@@ -185,7 +187,7 @@ fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
 }
 
 /// The files that hold the picture at hand.
-pub(super) fn files(state: &State) -> impl Iterator<Item = &Written> {
+pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
     // The scene's own image is in the files of the previous request if it has not changed.
     let is_own = state.request.is_own();
     let of_any_request = is_own && state.saving.unwritten.is_none();
@@ -221,7 +223,7 @@ pub(crate) fn not_saved(state: &State) -> Vec<String> {
 
 /// Words about each written file that another program has changed.
 pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
-    let words = |written: &Written| {
+    let words = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         written.lost.map(|lost| format!("{name} {} · w writes it again", lost.words()))
     };

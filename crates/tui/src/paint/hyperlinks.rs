@@ -9,7 +9,7 @@ const MOST: usize = 1000;
 
 /// Cells in a row, and the address that they lead to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Link {
+pub struct Hyperlink {
     /// The cells.
     pub cells: Rect,
     /// An address in ASCII without control characters.
@@ -18,11 +18,11 @@ pub struct Link {
 
 /// Addresses by number, from 1. An address keeps its number as long as the screen is known.
 #[derive(Debug, Default)]
-pub(super) struct Links {
+pub(super) struct Hyperlinks {
     addresses: Vec<String>,
 }
 
-impl Links {
+impl Hyperlinks {
     /// The number of an address. 0 if it cannot be one, or if there are too many.
     pub(super) fn number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn an_address_keeps_its_number_and_a_bad_one_has_none() {
-        let mut links = Links::default();
+        let mut links = Hyperlinks::default();
         assert_eq!(
             [links.number("file:///a"), links.number("file:///b"), links.number("file:///a")],
             [1, 2, 1]

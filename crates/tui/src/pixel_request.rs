@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::graphics::{Protocol, wrapped};
-use super::terminals::Terminal;
+use super::terminals::TerminalId;
 
 /// Number of the image in the question about kitty's protocol.
 pub(super) const QUERY_ID: u32 = 4211;
@@ -16,7 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(1);
 
 /// The way to the terminal, as far as it concerns images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Passage {
+pub(super) enum ImageRoute {
     /// None in between.
     Direct,
     /// tmux, which passes on what is wrapped if `allow-passthrough` is on.
@@ -29,7 +29,7 @@ pub(super) enum Passage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PixelRequest {
     pub(super) protocol: Protocol,
-    pub(super) passage: Passage,
+    pub(super) passage: ImageRoute,
     /// Whether the environment names a terminal that has the protocol.
     pub(super) is_known: bool,
 }
@@ -39,11 +39,11 @@ impl PixelRequest {
         let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
         let passage = match () {
-            () if is_set("TMUX") => Passage::Tmux,
-            () if is_plain || is_set("STY") || term.starts_with("screen") => Passage::Closed,
-            () => Passage::Direct,
+            () if is_set("TMUX") => ImageRoute::Tmux,
+            () if is_plain || is_set("STY") || term.starts_with("screen") => ImageRoute::Closed,
+            () => ImageRoute::Direct,
         };
-        let terminal = Terminal::of_environment(variable);
+        let terminal = TerminalId::of_environment(variable);
         let has_iterm = terminal.is_some_and(|terminal| terminal.brand.has_iterm_images());
         Self { protocol, passage, is_known: protocol == Protocol::Iterm && has_iterm }
     }
@@ -51,25 +51,25 @@ impl PixelRequest {
     /// The question, if it is not among those that are asked anyway.
     pub(super) fn question(self) -> Vec<u8> {
         match (self.protocol, self.passage) {
-            (Protocol::Kitty, Passage::Direct) => KITTY_QUERY.to_vec(),
-            (Protocol::Kitty, Passage::Tmux) => wrapped(KITTY_QUERY),
-            (Protocol::Iterm, Passage::Tmux) => wrapped(NAME_QUERY),
-            (Protocol::Iterm, Passage::Direct) => NAME_QUERY.to_vec(),
+            (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
+            (Protocol::Kitty, ImageRoute::Tmux) => wrapped(KITTY_QUERY),
+            (Protocol::Iterm, ImageRoute::Tmux) => wrapped(NAME_QUERY),
+            (Protocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
             // Device attributes are always asked for; tmux draws sixels itself.
-            (Protocol::Sixel, _) | (_, Passage::Closed) => Vec::new(),
+            (Protocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
         }
     }
 
     /// Time at which the user is told that the terminal has not answered.
     pub(super) fn deadline(self, now: Instant) -> Instant {
-        if self.passage == Passage::Closed { now } else { now + PATIENCE }
+        if self.passage == ImageRoute::Closed { now } else { now + PATIENCE }
     }
 
     /// Whether an answer about device attributes comes after all others. tmux answers for these before what it passes on.
     pub(super) fn ends_with_attributes(self) -> bool {
         match (self.protocol, self.passage) {
-            (Protocol::Sixel, _) | (_, Passage::Direct) => true,
-            (Protocol::Kitty | Protocol::Iterm, Passage::Tmux | Passage::Closed) => false,
+            (Protocol::Sixel, _) | (_, ImageRoute::Direct) => true,
+            (Protocol::Kitty | Protocol::Iterm, ImageRoute::Tmux | ImageRoute::Closed) => false,
         }
     }
 
@@ -82,10 +82,10 @@ impl PixelRequest {
         };
         let instead = "half blocks are shown instead";
         match (self.protocol, self.passage) {
-            (Protocol::Kitty | Protocol::Iterm, Passage::Tmux) => format!(
+            (Protocol::Kitty | Protocol::Iterm, ImageRoute::Tmux) => format!(
                 "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux runs in {terminals}"
             ),
-            (Protocol::Sixel, _) | (_, Passage::Direct | Passage::Closed) => {
+            (Protocol::Sixel, _) | (_, ImageRoute::Direct | ImageRoute::Closed) => {
                 format!("this terminal shows no {name} images: {instead}; use {terminals}")
             }
         }
@@ -106,13 +106,13 @@ mod tests {
     fn the_environment_decides_how_to_ask() {
         let xterm = ("TERM", "xterm-256color");
         let direct = request(Protocol::Kitty, &[xterm], false);
-        assert_eq!((direct.passage, direct.question()), (Passage::Direct, KITTY_QUERY.to_vec()));
+        assert_eq!((direct.passage, direct.question()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
         let tmux = request(Protocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
-        assert_eq!(tmux.passage, Passage::Tmux);
+        assert_eq!(tmux.passage, ImageRoute::Tmux);
         assert!(tmux.question().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
         let screen = request(Protocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
-        assert_eq!((screen.passage, screen.question()), (Passage::Closed, Vec::new()));
-        assert_eq!(request(Protocol::Iterm, &[xterm], true).passage, Passage::Closed);
+        assert_eq!((screen.passage, screen.question()), (ImageRoute::Closed, Vec::new()));
+        assert_eq!(request(Protocol::Iterm, &[xterm], true).passage, ImageRoute::Closed);
         assert!(request(Protocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         assert!(!request(Protocol::Iterm, &[xterm], false).is_known);
         assert!(!request(Protocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);

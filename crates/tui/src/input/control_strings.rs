@@ -1,19 +1,19 @@
-//! Reports of a terminal in strings: its name, its colours, its abilities.
+//! Reports of a terminal in strings: its name, its colors, its abilities.
 
 use crate::graphics::Protocol;
-use crate::known::Answer;
-use crate::pixels::QUERY_ID;
-use crate::terminals::Terminal;
+use crate::pixel_request::QUERY_ID;
+use crate::terminal_replies::TerminalReply;
+use crate::terminals::TerminalId;
 
 /// A report in a control string (DCS) as it comes.
 #[derive(Debug, Default)]
-pub(super) struct Report {
-    kind: Kind,
+pub(super) struct ControlString {
+    kind: ReportKind,
     text: Vec<u8>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Kind {
+enum ReportKind {
     #[default]
     Other,
     /// XTVERSION: name and version.
@@ -25,13 +25,13 @@ enum Kind {
 /// Longer ones say nothing that is of use.
 const LONGEST: usize = 256;
 
-impl Report {
+impl ControlString {
     /// One that begins with these.
     pub(super) fn begin(intermediates: &[u8], first: u16, action: char) -> Self {
         let kind = match (intermediates, action) {
-            (b">", '|') => Kind::Name,
-            (b"+", 'r') if first == 1 => Kind::Capability,
-            _ => Kind::Other,
+            (b">", '|') => ReportKind::Name,
+            (b"+", 'r') if first == 1 => ReportKind::Capability,
+            _ => ReportKind::Other,
         };
         Self { kind, text: Vec::new() }
     }
@@ -42,13 +42,12 @@ impl Report {
         }
     }
 
-    pub(super) fn answer(&self) -> Answer {
+    pub(super) fn answer(&self) -> TerminalReply {
         match self.kind {
-            Kind::Name => {
-                Terminal::of_report(&String::from_utf8_lossy(&self.text)).map_or(Answer::Other, Answer::Name)
-            }
-            Kind::Capability if has_true_color(&self.text) => Answer::TrueColor,
-            Kind::Capability | Kind::Other => Answer::Other,
+            ReportKind::Name => TerminalId::of_report(&String::from_utf8_lossy(&self.text))
+                .map_or(TerminalReply::Other, TerminalReply::Name),
+            ReportKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
+            ReportKind::Capability | ReportKind::Other => TerminalReply::Other,
         }
     }
 }
@@ -59,30 +58,30 @@ fn has_true_color(text: &[u8]) -> bool {
     names.into_iter().any(|name| name == b"524742" || name == b"5463")
 }
 
-/// An operating system command (OSC): a colour of the palette or the background.
-pub(super) fn command(params: &[&[u8]]) -> Answer {
+/// An operating system command (OSC): a color of the palette or the background.
+pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
     let color = |text: &[u8]| color(std::str::from_utf8(text).ok()?);
     let answer = match params {
-        [b"11", text, ..] => color(text).map(Answer::Background),
+        [b"11", text, ..] => color(text).map(TerminalReply::Background),
         [b"4", index, text, ..] => {
-            number(index).zip(color(text)).map(|(index, rgb)| Answer::Ink { index, rgb })
+            number(index).zip(color(text)).map(|(index, rgb)| TerminalReply::Ink { index, rgb })
         }
         _ => None,
     };
-    answer.unwrap_or(Answer::Other)
+    answer.unwrap_or(TerminalReply::Other)
 }
 
 /// An application program command (APC): kitty's answer to a question about images.
-pub(super) fn application(text: &[u8]) -> Answer {
+pub(super) fn application(text: &[u8]) -> TerminalReply {
     let of_query = format!("Gi={QUERY_ID};OK");
-    if text == of_query.as_bytes() { Answer::Images(Protocol::Kitty) } else { Answer::Other }
+    if text == of_query.as_bytes() { TerminalReply::Images(Protocol::Kitty) } else { TerminalReply::Other }
 }
 
 fn number(text: &[u8]) -> Option<u8> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
-/// `rgb:r/g/b` or `rgba:r/g/b/a`, each of 1 to 4 hexadecimal digits, as X11 writes colours; or `#rrggbb`.
+/// `rgb:r/g/b` or `rgba:r/g/b/a`, each of 1 to 4 hexadecimal digits, as X11 writes colors; or `#rrggbb`.
 fn color(text: &str) -> Option<[u8; 3]> {
     if let Some(digits) = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii()) {
         let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
@@ -103,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_as_x11_writes_them() {
+    fn colors_as_x11_writes_them() {
         assert_eq!(color("rgb:ffff/8080/0000"), Some([255, 128, 0]));
         assert_eq!(color("rgb:f/8/0"), Some([255, 136, 0]));
         assert_eq!(color("rgba:1c1c/1c1c/1c1c/ffff"), Some([28, 28, 28]));
@@ -119,6 +118,6 @@ mod tests {
         assert!(has_true_color(b"524742=38"));
         assert!(has_true_color(b"5463"));
         assert!(!has_true_color(b"544e=787465726d"));
-        assert_eq!(Report::begin(b"+", 0, 'r').answer(), Answer::Other);
+        assert_eq!(ControlString::begin(b"+", 0, 'r').answer(), TerminalReply::Other);
     }
 }

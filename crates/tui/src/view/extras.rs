@@ -11,14 +11,14 @@ use crate::state::State;
 
 /// Links, and cells that wait for the picture.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct Drawn {
+pub(crate) struct ViewExtras {
     /// Cells of names of files.
     pub(crate) files: Vec<(Rect, PathBuf)>,
     /// Cells that come after the picture over a thin line.
     pub(crate) later: Rect,
 }
 
-impl Drawn {
+impl ViewExtras {
     /// Writes the pieces of a line, and notes where names of written files are. Returns the columns used.
     pub(super) fn put(
         &mut self,

@@ -1,8 +1,8 @@
 use super::*;
 
 /// A line with a terminal at its end, in simulated time, to which as much is sent as the flow control allows.
-struct Relay {
-    line: Line,
+struct SimulatedTerminal {
+    line: Connection,
     start: Instant,
     now: Instant,
     bytes_a_second: f64,
@@ -11,18 +11,18 @@ struct Relay {
     /// When the last byte leaves the line's queue.
     busy: Instant,
     /// Answers under way.
-    due: VecDeque<(Instant, Question)>,
+    due: VecDeque<(Instant, QueryKind)>,
     carried: usize,
     /// Most bytes and longest wait in the queue, since the last look.
     most_in_flight: usize,
     longest: Duration,
 }
 
-impl Relay {
+impl SimulatedTerminal {
     fn new(bytes_a_second: f64, milliseconds: u64, answers: bool, is_multiplexed: bool) -> Self {
         let now = Instant::now();
         let mut relay = Self {
-            line: Line::new(is_multiplexed, now),
+            line: Connection::new(is_multiplexed, now),
             start: now,
             now,
             bytes_a_second,
@@ -34,11 +34,11 @@ impl Relay {
             most_in_flight: 0,
             longest: Duration::ZERO,
         };
-        relay.send(12, Some(Question::Attributes));
+        relay.send(12, Some(QueryKind::Attributes));
         relay
     }
 
-    fn send(&mut self, bytes: usize, question: Option<Question>) {
+    fn send(&mut self, bytes: usize, question: Option<QueryKind>) {
         self.line.send(bytes, question, self.now);
         self.line.written(bytes);
         self.busy = self.busy.max(self.now) + Duration::from_secs_f64(bytes as f64 / self.bytes_a_second);
@@ -87,7 +87,7 @@ fn lines_are_filled_and_their_queues_stay_short() {
     for (bytes_a_second, milliseconds) in
         [(125e3, 150), (125e3, 20), (1.25e6, 150), (16e3, 150), (16e3, 600), (1e8, 1), (6e3, 300)]
     {
-        let mut relay = Relay::new(bytes_a_second, milliseconds, true, false);
+        let mut relay = SimulatedTerminal::new(bytes_a_second, milliseconds, true, false);
         relay.run(10_000);
         relay.run(10_000);
         let name = format!("{bytes_a_second} B/s, {milliseconds} ms");
@@ -104,7 +104,7 @@ fn lines_are_filled_and_their_queues_stay_short() {
 
 #[test]
 fn a_terminal_that_never_answers_is_paced_by_time() {
-    let mut relay = Relay::new(125e3, 150, false, false);
+    let mut relay = SimulatedTerminal::new(125e3, 150, false, false);
     relay.run(900);
     assert!(relay.most_in_flight <= MOST && relay.line.owes());
     relay.run(10_000);
@@ -115,16 +115,16 @@ fn a_terminal_that_never_answers_is_paced_by_time() {
 
 #[test]
 fn a_late_answer_is_believed() {
-    let mut relay = Relay::new(125e3, 1500, true, false);
+    let mut relay = SimulatedTerminal::new(125e3, 1500, true, false);
     relay.run(1200);
-    assert_eq!(relay.line.pace, Pace::Silent);
+    assert_eq!(relay.line.pace, SendRate::Silent);
     relay.run(2000);
-    assert_eq!(relay.line.pace, Pace::Answers);
+    assert_eq!(relay.line.pace, SendRate::ProbeReplies);
 }
 
 #[test]
 fn behind_a_multiplexer_time_counts_as_well() {
-    let mut relay = Relay::new(125e3, 150, true, true);
+    let mut relay = SimulatedTerminal::new(125e3, 150, true, true);
     relay.run(10_000);
     assert!(relay.longest <= Duration::from_millis(140), "{:?}", relay.longest);
     assert!(relay.share(10_000) > 0.7, "{}", relay.share(10_000));
@@ -132,7 +132,7 @@ fn behind_a_multiplexer_time_counts_as_well() {
 
 #[test]
 fn a_line_that_stands_still_gets_little_and_recovers() {
-    let mut relay = Relay::new(125e3, 150, true, false);
+    let mut relay = SimulatedTerminal::new(125e3, 150, true, false);
     relay.run(3_000);
     let lost = std::mem::take(&mut relay.due);
     assert!(!lost.is_empty());
@@ -146,27 +146,27 @@ fn a_line_that_stands_still_gets_little_and_recovers() {
 
 #[test]
 fn a_lost_answer_holds_the_screen_up_for_a_second() {
-    let mut line = Line::new(false, Instant::now());
+    let mut line = Connection::new(false, Instant::now());
     let now = Instant::now();
-    line.send(100, Some(Question::Attributes), now);
-    line.answered(Question::Attributes, now + Duration::from_millis(5));
+    line.send(100, Some(QueryKind::Attributes), now);
+    line.answered(QueryKind::Attributes, now + Duration::from_millis(5));
     let sent = now + Duration::from_millis(100);
-    line.send(line.window_bytes(), Some(Question::Status), sent);
+    line.send(line.window_bytes(), Some(QueryKind::Status), sent);
     assert_eq!(line.room(sent + Duration::from_millis(900)), 0);
     assert_eq!(line.wake(sent), Some(sent + SILENCE));
     assert!(line.room(sent + SILENCE) > 0);
     // Where answers take long they are waited for longer.
-    let mut slow = Line::new(false, now);
-    slow.send(100, Some(Question::Attributes), now);
-    slow.answered(Question::Attributes, now + Duration::from_millis(800));
-    slow.send(slow.window_bytes(), Some(Question::Status), sent);
+    let mut slow = Connection::new(false, now);
+    slow.send(100, Some(QueryKind::Attributes), now);
+    slow.answered(QueryKind::Attributes, now + Duration::from_millis(800));
+    slow.send(slow.window_bytes(), Some(QueryKind::Status), sent);
     assert_eq!(slow.room(sent + Duration::from_secs(3)), 0);
     assert!(slow.room(sent + Duration::from_millis(3200)) > 0);
 }
 
 #[test]
 fn nothing_is_due_while_nothing_is_owed() {
-    let mut relay = Relay::new(1e8, 1, true, false);
+    let mut relay = SimulatedTerminal::new(1e8, 1, true, false);
     relay.run(100);
     relay.now += Duration::from_secs(1);
     while let Some((_, question)) = relay.due.pop_front() {
@@ -179,24 +179,24 @@ fn nothing_is_due_while_nothing_is_owed() {
 
 #[test]
 fn answers_that_nobody_asked_for_change_nothing() {
-    let mut line = Line::new(false, Instant::now());
+    let mut line = Connection::new(false, Instant::now());
     let now = Instant::now();
-    line.answered(Question::Status, now);
-    line.send(100, Some(Question::Attributes), now);
-    line.answered(Question::Status, now);
+    line.answered(QueryKind::Status, now);
+    line.send(100, Some(QueryKind::Attributes), now);
+    line.answered(QueryKind::Status, now);
     assert!(line.owes());
-    line.answered(Question::Attributes, now);
+    line.answered(QueryKind::Attributes, now);
     assert!(!line.owes() && line.in_flight == 0);
 }
 
 #[test]
 fn a_terminal_that_was_slow_for_a_moment_is_quick_again_by_small_slices() {
-    let mut line = Line::new(false, Instant::now());
+    let mut line = Connection::new(false, Instant::now());
     let mut now = Instant::now();
-    let mut answer = |line: &mut Line, bytes: usize, milliseconds: u64| {
-        line.send(bytes, Some(Question::Status), now);
+    let mut answer = |line: &mut Connection, bytes: usize, milliseconds: u64| {
+        line.send(bytes, Some(QueryKind::Status), now);
         now += Duration::from_millis(milliseconds);
-        line.answered(Question::Status, now);
+        line.answered(QueryKind::Status, now);
     };
     assert!(!line.is_quick(), "nothing is known of it");
     answer(&mut line, 2000, 1);
@@ -209,8 +209,8 @@ fn a_terminal_that_was_slow_for_a_moment_is_quick_again_by_small_slices() {
         answer(&mut line, 60, 20);
     }
     assert!(line.is_quick());
-    let mut behind = Line::new(true, now);
-    behind.send(12, Some(Question::Attributes), now);
-    behind.answered(Question::Attributes, now + Duration::from_millis(1));
+    let mut behind = Connection::new(true, now);
+    behind.send(12, Some(QueryKind::Attributes), now);
+    behind.answered(QueryKind::Attributes, now + Duration::from_millis(1));
     assert!(!behind.is_quick(), "what answers is not the terminal");
 }

@@ -9,7 +9,7 @@ use super::event::Window;
 use super::options::PreviewChoice;
 use super::paint::in_lines;
 use super::terminal;
-use super::view::preview::{Inks, shown_by, size_in_cells};
+use super::view::preview::{PreviewColors, shown_by, size_in_cells};
 use super::view::text::{columns, shortened};
 use crate::film::Picture;
 
@@ -26,20 +26,20 @@ const LEAST_ROWS: u16 = 7;
 
 /// A picture, and what stands above it.
 #[derive(Clone, Debug)]
-pub struct Named {
+pub struct NamedImage {
     /// Without control characters.
     pub name: String,
     /// Pictures that are printed together have one size.
     pub picture: Picture,
 }
 
-/// Lines that show pictures beside each other, or below each other in a narrow terminal, in the colours that it has; without colours,
+/// Lines that show pictures beside each other, or below each other in a narrow terminal, in the colors that it has; without colors,
 /// in characters. Nothing for a terminal of less than 30 columns. Where stdout is none: for one of 80 columns and 24 rows.
-pub fn printed(pictures: &[Named], color: ColorChoice, is_terminal: bool) -> String {
+pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::depth(color, variable);
     let shades = Shades::new(depth, color::ansi(&variable("TERM").unwrap_or_default()));
-    let inks = Inks { depth, shades: &shades, is_light: color::has_light_background(variable) };
+    let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
     let (size, aspect) = if is_terminal { room(&terminal::window(None)) } else { ((80, 24), 2.0) };
     let buffers = laid_out(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| in_lines(buffer, depth != ColorDepth::None)).collect()
@@ -53,7 +53,12 @@ fn room(window: &Window) -> ((u16, u16), f32) {
 }
 
 /// The pictures in one row or in several.
-fn laid_out(pictures: &[Named], inks: Inks<'_>, (across, down): (u16, u16), aspect: f32) -> Vec<Buffer> {
+fn laid_out(
+    pictures: &[NamedImage],
+    inks: PreviewColors<'_>,
+    (across, down): (u16, u16),
+    aspect: f32,
+) -> Vec<Buffer> {
     let count = pictures.len().max(1) as u16;
     let beside = across.saturating_sub(GAP * (count - 1)) / count;
     let rows = down.saturating_sub(WORDS).max(LEAST_ROWS);
@@ -67,7 +72,7 @@ fn laid_out(pictures: &[Named], inks: Inks<'_>, (across, down): (u16, u16), aspe
 }
 
 /// Pictures beside each other with their names above, each in so many columns and rows at most.
-fn row(pictures: &[Named], inks: Inks<'_>, room: (u16, u16), aspect: f32) -> Buffer {
+fn row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
     let names = pictures.iter().map(|one| columns(&one.name).min(room.0)).max().unwrap_or(0);
@@ -88,9 +93,9 @@ mod tests {
 
     fn laid(size: (u16, u16), depth: ColorDepth) -> Vec<String> {
         let picture = Picture { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
-        let named = |name: &str| Named { name: name.to_owned(), picture: picture.clone() };
+        let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = Shades::new(depth, &XTERM);
-        let inks = Inks { depth, shades: &shades, is_light: false };
+        let inks = PreviewColors { depth, shades: &shades, is_light: false };
         let buffers =
             laid_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
         let text: String = buffers.iter().map(|buffer| in_lines(buffer, false)).collect();
@@ -118,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn without_colours_they_are_characters() {
+    fn without_colors_they_are_characters() {
         let lines = laid((100, 60), ColorDepth::None);
         assert!(lines.len() > 8 && lines[1..].iter().all(|line| line.is_ascii()), "{lines:?}");
     }

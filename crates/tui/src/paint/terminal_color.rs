@@ -1,36 +1,36 @@
-//! The colours of a terminal.
+//! The colors of a terminal.
 
 use ratatui::style::Color;
 
 use crate::color::fixed;
 
-/// A colour as the terminal knows it.
+/// A color as the terminal knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shade {
+pub(super) enum TerminalColor {
     /// The terminal's own background.
     Ground,
     /// The terminal's own foreground.
     Ink,
-    /// One of the palette. The first 16 are the user's, the others a cube and greys.
+    /// One of the palette. The first 16 are the user's, the others a cube and grays.
     Palette(u8),
     /// Red, green, blue in sRGB.
     Rgb([u8; 3]),
 }
 
-/// The two colours of a cell.
+/// The two colors of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Layer {
+pub(super) enum ColorLayer {
     Foreground,
     Background,
 }
 
-impl Shade {
-    /// The shade of a cell's colour in this layer.
-    pub(super) fn of(color: Color, layer: Layer) -> Self {
+impl TerminalColor {
+    /// The shade of a cell's color in this layer.
+    pub(super) fn of(color: Color, layer: ColorLayer) -> Self {
         match color {
             Color::Reset => match layer {
-                Layer::Foreground => Self::Ink,
-                Layer::Background => Self::Ground,
+                ColorLayer::Foreground => Self::Ink,
+                ColorLayer::Background => Self::Ground,
             },
             Color::Black => Self::Palette(0),
             Color::Red => Self::Palette(1),
@@ -54,10 +54,10 @@ impl Shade {
     }
 
     /// Whether this layer can have it.
-    pub(super) fn fits(self, layer: Layer) -> bool {
+    pub(super) fn fits(self, layer: ColorLayer) -> bool {
         match self {
-            Self::Ground => layer == Layer::Background,
-            Self::Ink => layer == Layer::Foreground,
+            Self::Ground => layer == ColorLayer::Background,
+            Self::Ink => layer == ColorLayer::Foreground,
             Self::Palette(_) | Self::Rgb(_) => true,
         }
     }
@@ -82,10 +82,10 @@ impl Shade {
     }
 
     /// Appends the parameters of SGR that set it in this layer, which must be one that it fits.
-    pub(super) fn push(self, layer: Layer, out: &mut Vec<u8>) {
+    pub(super) fn push(self, layer: ColorLayer, out: &mut Vec<u8>) {
         let base = match layer {
-            Layer::Foreground => 30,
-            Layer::Background => 40,
+            ColorLayer::Foreground => 30,
+            ColorLayer::Background => 40,
         };
         match self {
             Self::Ground | Self::Ink => push_number(base + 9, out),
@@ -98,7 +98,7 @@ impl Shade {
         }
     }
 
-    /// Bytes that [`Shade::push`] appends.
+    /// Bytes that [`TerminalColor::push`] appends.
     pub(super) fn length(self) -> u32 {
         match self {
             Self::Ground | Self::Ink | Self::Palette(0..8) => 2,
@@ -137,7 +137,7 @@ fn push_list(numbers: &[u16], out: &mut Vec<u8>) {
 mod tests {
     use super::*;
 
-    fn text(shade: Shade, layer: Layer) -> String {
+    fn text(shade: TerminalColor, layer: ColorLayer) -> String {
         let mut out = Vec::new();
         shade.push(layer, &mut out);
         String::from_utf8(out).expect("ASCII")
@@ -145,32 +145,33 @@ mod tests {
 
     #[test]
     fn parameters_are_those_of_ecma_48_and_xterm() {
-        use Layer::{Background, Foreground};
-        assert_eq!(text(Shade::Ink, Foreground), "39");
-        assert_eq!(text(Shade::Ground, Background), "49");
-        assert_eq!(text(Shade::Palette(3), Foreground), "33");
-        assert_eq!(text(Shade::Palette(3), Background), "43");
-        assert_eq!(text(Shade::Palette(8), Foreground), "90");
-        assert_eq!(text(Shade::Palette(15), Background), "107");
-        assert_eq!(text(Shade::Palette(16), Foreground), "38;5;16");
-        assert_eq!(text(Shade::Rgb([1, 23, 255]), Background), "48;2;1;23;255");
+        use ColorLayer::{Background, Foreground};
+        assert_eq!(text(TerminalColor::Ink, Foreground), "39");
+        assert_eq!(text(TerminalColor::Ground, Background), "49");
+        assert_eq!(text(TerminalColor::Palette(3), Foreground), "33");
+        assert_eq!(text(TerminalColor::Palette(3), Background), "43");
+        assert_eq!(text(TerminalColor::Palette(8), Foreground), "90");
+        assert_eq!(text(TerminalColor::Palette(15), Background), "107");
+        assert_eq!(text(TerminalColor::Palette(16), Foreground), "38;5;16");
+        assert_eq!(text(TerminalColor::Rgb([1, 23, 255]), Background), "48;2;1;23;255");
     }
 
     #[test]
     fn lengths_are_those_of_the_parameters() {
-        for shade in
-            (16..=255).map(Shade::Palette).chain([Shade::Rgb([0, 10, 100]), Shade::Rgb([9, 99, 255])])
+        for shade in (16..=255)
+            .map(TerminalColor::Palette)
+            .chain([TerminalColor::Rgb([0, 10, 100]), TerminalColor::Rgb([9, 99, 255])])
         {
-            assert_eq!(text(shade, Layer::Foreground).len(), shade.length() as usize, "{shade:?}");
+            assert_eq!(text(shade, ColorLayer::Foreground).len(), shade.length() as usize, "{shade:?}");
         }
     }
 
     #[test]
     fn the_palette_is_that_of_xterm() {
-        assert_eq!(Shade::Palette(16).rgb(), Some([0, 0, 0]));
-        assert_eq!(Shade::Palette(67).rgb(), Some([95, 135, 175]));
-        assert_eq!(Shade::Palette(231).rgb(), Some([255, 255, 255]));
-        assert_eq!(Shade::Palette(255).rgb(), Some([238, 238, 238]));
-        assert_eq!(Shade::Palette(15).rgb(), None);
+        assert_eq!(TerminalColor::Palette(16).rgb(), Some([0, 0, 0]));
+        assert_eq!(TerminalColor::Palette(67).rgb(), Some([95, 135, 175]));
+        assert_eq!(TerminalColor::Palette(231).rgb(), Some([255, 255, 255]));
+        assert_eq!(TerminalColor::Palette(255).rgb(), Some([238, 238, 238]));
+        assert_eq!(TerminalColor::Palette(15).rgb(), None);
     }
 }

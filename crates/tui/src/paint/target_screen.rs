@@ -3,16 +3,16 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::cell::{CellContent, Mosaic};
 use super::fidelity::Fidelity;
-use super::look::{Look, Mosaic};
 use crate::color::ColorDepth;
 
 /// A screen that is wanted.
 #[derive(Debug)]
-pub(super) struct Wanted {
+pub(super) struct TargetScreen {
     pub(super) columns: u16,
     pub(super) rows: u16,
-    looks: Vec<Look>,
+    looks: Vec<CellContent>,
     pub(super) picture: Rect,
     /// Words in these cells come after the picture.
     pub(super) later: Rect,
@@ -22,14 +22,14 @@ pub(super) struct Wanted {
 
 /// Parts of the screen, in the order in which they are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Region {
+pub(super) enum ScreenRegion {
     Words,
     Picture,
     /// Words that wait for the picture.
     Later,
 }
 
-impl Wanted {
+impl TargetScreen {
     /// Nothing at all.
     pub(super) fn nothing(depth: ColorDepth) -> Self {
         Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
@@ -45,7 +45,7 @@ impl Wanted {
         self.looks.is_empty()
     }
 
-    pub(super) fn row(&self, y: u16) -> &[Look] {
+    pub(super) fn row(&self, y: u16) -> &[CellContent] {
         let columns = usize::from(self.columns);
         &self.looks[usize::from(y) * columns..][..columns]
     }
@@ -61,11 +61,13 @@ impl Wanted {
             && self.row(y).get(columns.clone()) == other.row(y).get(columns)
     }
 
-    /// The colours of a cell of the picture; none of words, which may lie over it.
+    /// The colors of a cell of the picture; none of words, which may lie over it.
     pub(super) fn mosaic(&self, x: u16, y: u16) -> Option<Mosaic> {
         match self.row(y)[usize::from(x)] {
-            Look::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
-            Look::Mosaic(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
+            CellContent::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
+            CellContent::Mosaic(_) | CellContent::Text(_) | CellContent::Covered | CellContent::Unknown => {
+                None
+            }
         }
     }
 
@@ -79,30 +81,30 @@ impl Wanted {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for place in cells.positions() {
             let index = usize::from(place.y) * usize::from(self.columns) + usize::from(place.x);
-            if let Look::Text(text) = &mut self.looks[index] {
+            if let CellContent::Text(text) = &mut self.looks[index] {
                 text.pen.link = number;
             }
         }
     }
 
     /// The part of the screen that a cell belongs to.
-    pub(super) fn region(&self, x: u16, y: u16) -> Region {
+    pub(super) fn region(&self, x: u16, y: u16) -> ScreenRegion {
         match () {
-            () if self.is_picture(x, y) => Region::Picture,
-            () if !self.later.contains((x, y).into()) => Region::Words,
-            () if self.row(y)[usize::from(x)] == Look::BLANK => Region::Words,
-            () => Region::Later,
+            () if self.is_picture(x, y) => ScreenRegion::Picture,
+            () if !self.later.contains((x, y).into()) => ScreenRegion::Words,
+            () if self.row(y)[usize::from(x)] == CellContent::BLANK => ScreenRegion::Words,
+            () => ScreenRegion::Later,
         }
     }
 
-    /// Whether a cell belongs to the picture, be it of two colours or, without colours, a character.
+    /// Whether a cell belongs to the picture, be it of two colors or, without colors, a character.
     pub(super) fn is_picture(&self, x: u16, y: u16) -> bool {
         let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
         self.picture.contains((x, y).into())
             && match &self.row(y)[usize::from(x)] {
-                Look::Mosaic(_) => true,
-                Look::Text(text) => self.depth == ColorDepth::None && is_tone(&text.symbol),
-                Look::Covered | Look::Unknown => false,
+                CellContent::Mosaic(_) => true,
+                CellContent::Text(text) => self.depth == ColorDepth::None && is_tone(&text.symbol),
+                CellContent::Covered | CellContent::Unknown => false,
             }
     }
 
@@ -124,17 +126,18 @@ impl Wanted {
 }
 
 /// Looks of a buffer's cells.
-pub(super) fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<Look> {
+pub(super) fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
     let columns = usize::from(buffer.area.width.max(1));
-    let mut looks: Vec<Look> = buffer.content.iter().map(|cell| Look::of(cell, depth)).collect();
+    let mut looks: Vec<CellContent> =
+        buffer.content.iter().map(|cell| CellContent::of(cell, depth)).collect();
     for row in looks.chunks_mut(columns) {
         let mut x = 0;
         while x < row.len() {
             let end = x + usize::from(row[x].columns());
             if end > row.len() {
-                row[x] = Look::BLANK;
+                row[x] = CellContent::BLANK;
             } else {
-                row[x + 1..end].fill(Look::Covered);
+                row[x + 1..end].fill(CellContent::Covered);
             }
             x = end;
         }

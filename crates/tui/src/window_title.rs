@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::graphics::base64;
 use super::state::{Activity, State};
-use super::terminals::Notice;
+use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
 
@@ -24,7 +24,7 @@ pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
 
 /// A bar of progress.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Bar {
+pub(super) enum ProgressBar {
     #[default]
     None,
     /// At work, nobody knows for how long.
@@ -34,7 +34,7 @@ pub(super) enum Bar {
     Broken,
 }
 
-impl Bar {
+impl ProgressBar {
     fn bytes(self) -> Vec<u8> {
         let bar = |state: u8, percent: u32| format!("\x1b]9;4;{state};{percent}\x1b\\").into_bytes();
         match self {
@@ -49,12 +49,12 @@ impl Bar {
 
 /// Title and progress of the window, as far as the terminal has them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Chrome {
+pub(super) struct WindowTitle {
     pub(super) title: Option<String>,
-    pub(super) bar: Option<Bar>,
+    pub(super) bar: Option<ProgressBar>,
 }
 
-impl Chrome {
+impl WindowTitle {
     /// Title, progress and links of the state; `is_slow` says that the line takes time. `None` if they stay as they are.
     pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
         let abilities = state.display.abilities;
@@ -96,23 +96,23 @@ fn name(state: &State) -> String {
     visible(&name.to_string_lossy()).into_owned()
 }
 
-fn bar(state: &State, percent: Option<u32>) -> Bar {
+fn bar(state: &State, percent: Option<u32>) -> ProgressBar {
     match state.work.activity {
-        Activity::Running { .. } if state.work.paused => Bar::Paused(percent.unwrap_or(0)),
-        Activity::Running { .. } => percent.map_or(Bar::Busy, Bar::Percent),
-        Activity::Broken => Bar::Broken,
-        Activity::Done | Activity::Waiting | Activity::Cancelled => Bar::None,
+        Activity::Running { .. } if state.work.paused => ProgressBar::Paused(percent.unwrap_or(0)),
+        Activity::Running { .. } => percent.map_or(ProgressBar::Busy, ProgressBar::Percent),
+        Activity::Broken => ProgressBar::Broken,
+        Activity::Done | Activity::Waiting | Activity::Cancelled => ProgressBar::None,
     }
 }
 
 /// Bytes of a notification that a render has ended, after so long.
-pub(super) fn notice(state: &State, notice: Notice, time: Duration) -> Vec<u8> {
+pub(super) fn notice(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
     let words = format!("{}: {} after {}", name(state), view::state_word(state), view::text::duration(time));
     match notice {
-        Notice::Osc9 => format!("\x1b]9;glimt: {words}\x1b\\").into_bytes(),
-        Notice::Osc99 => format!("\x1b]99;;glimt: {words}\x1b\\").into_bytes(),
-        Notice::Osc777 => format!("\x1b]777;notify;glimt;{words}\x1b\\").into_bytes(),
-        Notice::Bell => b"\x07".to_vec(),
+        NotificationProtocol::Osc9 => format!("\x1b]9;glimt: {words}\x1b\\").into_bytes(),
+        NotificationProtocol::Osc99 => format!("\x1b]99;;glimt: {words}\x1b\\").into_bytes(),
+        NotificationProtocol::Osc777 => format!("\x1b]777;notify;glimt;{words}\x1b\\").into_bytes(),
+        NotificationProtocol::Bell => b"\x07".to_vec(),
     }
 }
 
@@ -124,18 +124,18 @@ pub(super) fn copy(text: &str) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{Desk, progress};
+    use crate::fixtures::{TestUi, progress};
     use crate::pipeline::protocol::Event;
-    use crate::terminals::{Abilities, Brand, Terminal};
+    use crate::terminals::{Brand, Capabilities, TerminalId};
 
-    fn desk() -> Desk {
-        let mut desk = Desk::new();
-        desk.state.display.abilities = Terminal { brand: Brand::Ghostty, version: [1, 2] }.abilities();
-        desk
+    fn ui() -> TestUi {
+        let mut ui = TestUi::new();
+        ui.state.display.abilities = TerminalId { brand: Brand::Ghostty, version: [1, 2] }.abilities();
+        ui
     }
 
-    fn sent(before: &mut Chrome, desk: &Desk, is_slow: bool) -> String {
-        let now = Chrome::of(&desk.state, is_slow).unwrap_or_else(|| before.clone());
+    fn sent(before: &mut WindowTitle, ui: &TestUi, is_slow: bool) -> String {
+        let now = WindowTitle::of(&ui.state, is_slow).unwrap_or_else(|| before.clone());
         let bytes = before.changes(&now);
         *before = now;
         String::from_utf8(bytes).expect("UTF-8")
@@ -143,45 +143,45 @@ mod tests {
 
     #[test]
     fn the_window_says_what_is_going_on() {
-        let (mut desk, mut chrome) = (desk(), Chrome::default());
-        assert_eq!(sent(&mut chrome, &desk, false), "", "a short render is no news");
-        desk.wait(600);
+        let (mut ui, mut chrome) = (ui(), WindowTitle::default());
+        assert_eq!(sent(&mut chrome, &ui, false), "", "a short render is no news");
+        ui.wait(600);
         let busy = "\x1b]2;cornell.toml: rendering · glimt\x1b\\\x1b]9;4;3;0\x1b\\";
-        assert_eq!(sent(&mut chrome, &desk, false), busy);
-        desk.worker(Event::Progress { generation: 1, progress: progress(0.389, None) });
+        assert_eq!(sent(&mut chrome, &ui, false), busy);
+        ui.worker(Event::Progress { generation: 1, progress: progress(0.389, None) });
         let part = "\x1b]2;cornell.toml: rendering 38 % · glimt\x1b\\\x1b]9;4;1;38\x1b\\";
-        assert_eq!(sent(&mut chrome, &desk, false), part);
+        assert_eq!(sent(&mut chrome, &ui, false), part);
         let coarse = "\x1b]2;cornell.toml: rendering 30 % · glimt\x1b\\\x1b]9;4;1;30\x1b\\";
-        assert_eq!(sent(&mut chrome, &desk, true), coarse);
-        desk.press(' ');
+        assert_eq!(sent(&mut chrome, &ui, true), coarse);
+        ui.press(' ');
         let held = "\x1b]2;cornell.toml: paused 30 % · glimt\x1b\\\x1b]9;4;4;30\x1b\\";
-        assert_eq!(sent(&mut chrome, &desk, true), held);
-        desk.press(' ');
-        desk.finish([200, 30, 30]);
+        assert_eq!(sent(&mut chrome, &ui, true), held);
+        ui.press(' ');
+        ui.finish([200, 30, 30]);
         let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
-        assert_eq!(sent(&mut chrome, &desk, false), done);
-        assert_eq!(sent(&mut chrome, &desk, false), "", "nothing when nothing changes");
-        desk.fail(Vec::new());
-        desk.event(crate::event::Event::Settled);
-        assert!(sent(&mut chrome, &desk, false).contains("\x1b]9;4;2;100\x1b\\"));
+        assert_eq!(sent(&mut chrome, &ui, false), done);
+        assert_eq!(sent(&mut chrome, &ui, false), "", "nothing when nothing changes");
+        ui.fail(Vec::new());
+        ui.event(crate::event::Event::Settled);
+        assert!(sent(&mut chrome, &ui, false).contains("\x1b]9;4;2;100\x1b\\"));
     }
 
     #[test]
     fn a_terminal_without_abilities_gets_nothing() {
-        let (mut desk, mut chrome) = (Desk::new(), Chrome::default());
-        assert_eq!(desk.state.display.abilities, Abilities::default());
-        desk.finish([200, 30, 30]);
-        assert_eq!(sent(&mut chrome, &desk, false), "");
+        let (mut ui, mut chrome) = (TestUi::new(), WindowTitle::default());
+        assert_eq!(ui.state.display.abilities, Capabilities::default());
+        ui.finish([200, 30, 30]);
+        assert_eq!(sent(&mut chrome, &ui, false), "");
     }
 
     #[test]
     fn names_of_files_end_no_sequence() {
-        let mut desk = desk();
-        desk.state.request.scene = "a\x1b\\\x07b.toml".into();
-        desk.finish([200, 30, 30]);
-        let title = sent(&mut Chrome::default(), &desk, false);
+        let mut ui = ui();
+        ui.state.request.scene = "a\x1b\\\x07b.toml".into();
+        ui.finish([200, 30, 30]);
+        let title = sent(&mut WindowTitle::default(), &ui, false);
         assert_eq!(title, "\x1b]2;a␛\\␇b.toml: done · glimt\x1b\\");
-        let bytes = notice(&desk.state, Notice::Osc777, Duration::from_secs(95));
+        let bytes = notice(&ui.state, NotificationProtocol::Osc777, Duration::from_secs(95));
         let words = String::from_utf8(bytes).expect("UTF-8");
         assert_eq!(words, "\x1b]777;notify;glimt;a␛\\␇b.toml: done after 1 min 35 s\x1b\\");
         assert_eq!(copy("a b"), b"\x1b]52;c;YSBi\x1b\\");

@@ -6,12 +6,12 @@
 
 use ratatui::layout::Rect;
 
+use super::cell::{CellContent, Mosaic};
+use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
-use super::look::{Look, Mosaic};
-use super::moves::Place;
-use super::screen::Screen;
-use super::shade::Shade;
-use super::wanted::Wanted;
+use super::screen::ScreenModel;
+use super::target_screen::TargetScreen;
+use super::terminal_color::TerminalColor;
 
 /// First pictures are alike where no channel differs by more.
 const ALIKE: u8 = 2;
@@ -20,7 +20,7 @@ const MOST_NOISE: u8 = 12;
 
 /// The first picture of the request that the screen shows, cell by cell.
 #[derive(Debug, Default)]
-pub(super) struct Memory {
+pub(super) struct StableCells {
     columns: usize,
     picture: Rect,
     /// None: nothing is known.
@@ -33,14 +33,14 @@ pub(super) struct Memory {
     noise: u8,
 }
 
-impl Memory {
+impl StableCells {
     /// Nothing of what is on the screen is known.
     pub(super) fn forget(&mut self) {
         self.firsts.fill(None);
         self.steady.fill(false);
     }
 
-    pub(super) fn aim(&mut self, wanted: &Wanted, screen: Option<&Screen>) {
+    pub(super) fn aim(&mut self, wanted: &TargetScreen, screen: Option<&ScreenModel>) {
         let cells = usize::from(wanted.columns) * usize::from(wanted.rows);
         if self.picture != wanted.picture || self.firsts.len() != cells {
             *self = Self {
@@ -64,7 +64,7 @@ impl Memory {
     }
 
     /// A request shows its first picture.
-    fn begin(&mut self, wanted: &Wanted) {
+    fn begin(&mut self, wanted: &TargetScreen) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
         self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();
         self.noise = u8::MAX;
@@ -74,14 +74,16 @@ impl Memory {
     }
 
     /// The median of how far what is wanted is off the cells that did not change.
-    fn median(&self, wanted: &Wanted, screen: Option<&Screen>) -> usize {
+    fn median(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
         let mut counts = [0_u32; 256];
         let Some(screen) = screen else { return 0 };
         for y in wanted.picture.top()..wanted.picture.bottom() {
             for x in wanted.picture.left()..wanted.picture.right() {
-                if let (true, Look::Mosaic(shown), Some(wanted)) =
-                    (self.is_steady(Place { x, y }), screen.look(Place { x, y }), wanted.mosaic(x, y))
-                {
+                if let (true, CellContent::Mosaic(shown), Some(wanted)) = (
+                    self.is_steady(CellPosition { x, y }),
+                    screen.look(CellPosition { x, y }),
+                    wanted.mosaic(x, y),
+                ) {
                     counts[usize::from(apart(*shown, wanted))] += 1;
                 }
             }
@@ -96,7 +98,7 @@ impl Memory {
     }
 
     /// The mosaic for a cell: the one already shown, if only noise separates it from the requested one.
-    pub(super) fn mosaic(&self, at: Place, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
+    pub(super) fn mosaic(&self, at: CellPosition, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
         shown
             .filter(|shown| {
                 self.is_steady(at) && (self.noise == u8::MAX || apart(*shown, wanted) <= self.noise)
@@ -104,16 +106,16 @@ impl Memory {
             .unwrap_or(wanted)
     }
 
-    fn is_steady(&self, at: Place) -> bool {
+    fn is_steady(&self, at: CellPosition) -> bool {
         self.steady.get(self.index(at)).copied().unwrap_or(false)
     }
 
-    fn index(&self, at: Place) -> usize {
+    fn index(&self, at: CellPosition) -> usize {
         usize::from(at.y) * self.columns + usize::from(at.x)
     }
 
     /// Cells of the picture were drawn for the request under way.
-    pub(super) fn drawn(&mut self, at: Place, count: u16) {
+    pub(super) fn drawn(&mut self, at: CellPosition, count: u16) {
         let first = self.index(at);
         for index in first..first + usize::from(count) {
             if let Some(kept) = self.firsts.get_mut(index) {
@@ -127,7 +129,7 @@ impl Memory {
     /// way as well.
     pub(super) fn row_done(&mut self, y: u16) {
         for x in self.picture.left()..self.picture.right() {
-            let index = self.index(Place { x, y });
+            let index = self.index(CellPosition { x, y });
             if let Some(Some(newest)) = self.newest.get(index)
                 && !self.steady[index]
             {
@@ -149,7 +151,7 @@ fn noise(median: usize) -> u8 {
 
 /// The largest difference of a channel; 255 if the mosaics cannot be compared.
 fn apart(a: Mosaic, b: Mosaic) -> u8 {
-    let one = |a: Shade, b: Shade| match (a.rgb(), b.rgb()) {
+    let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),
         _ => u8::MAX,

@@ -9,12 +9,12 @@ const FULL: f64 = 12_000.0;
 
 /// The bytes that may be sent.
 #[derive(Debug)]
-pub(super) struct Bucket {
+pub(super) struct TokenBucket {
     tokens: f64,
     at: Instant,
 }
 
-impl Bucket {
+impl TokenBucket {
     pub(super) fn full(now: Instant) -> Self {
         Self { tokens: FULL, at: now }
     }

@@ -17,7 +17,7 @@ mod tests;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use self::bucket::Bucket;
+use self::bucket::TokenBucket;
 
 /// Most bytes on their way that the terminal has not answered for: 24 kB with those that take the screen, which are not
 /// counted.
@@ -43,7 +43,7 @@ const LEAST_SLICE: usize = 400;
 
 /// Questions that a terminal answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Question {
+pub(super) enum QueryKind {
     /// Primary device attributes: the last of the first questions. What has not answered before it never will.
     Attributes,
     /// A status report.
@@ -52,8 +52,8 @@ pub(super) enum Question {
 
 /// Bytes on their way, with the question at their end.
 #[derive(Clone, Copy, Debug)]
-struct Slice {
-    question: Question,
+struct SentSlice {
+    question: QueryKind,
     bytes: usize,
     sent: Instant,
     /// Whether the window was what kept more from being sent.
@@ -61,21 +61,21 @@ struct Slice {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Pace {
+enum SendRate {
     /// Whether the terminal answers is not known until then.
     Asked {
         until: Instant,
     },
-    Answers,
+    ProbeReplies,
     Silent,
 }
 
 /// The line to the terminal.
 #[derive(Debug)]
-pub(super) struct Line {
-    pace: Pace,
+pub(super) struct Connection {
+    pace: SendRate,
     is_multiplexed: bool,
-    flight: VecDeque<Slice>,
+    flight: VecDeque<SentSlice>,
     in_flight: usize,
     /// Bytes that may be in flight.
     window: f64,
@@ -87,16 +87,16 @@ pub(super) struct Line {
     recent: VecDeque<Duration>,
     /// When an answer last came, or one began to be owed.
     heard: Instant,
-    bucket: Bucket,
+    bucket: TokenBucket,
     /// Bytes that the system has not taken yet.
     unwritten: usize,
 }
 
-impl Line {
+impl Connection {
     /// A line of which nothing is known. `is_multiplexed`: what answers is not the terminal itself.
     pub(super) fn new(is_multiplexed: bool, now: Instant) -> Self {
         Self {
-            pace: Pace::Asked { until: now + PATIENCE },
+            pace: SendRate::Asked { until: now + PATIENCE },
             is_multiplexed,
             flight: VecDeque::new(),
             in_flight: 0,
@@ -105,7 +105,7 @@ impl Line {
             round_trips: RoundTrips::default(),
             recent: VecDeque::with_capacity(USUAL_OF),
             heard: now,
-            bucket: Bucket::full(now),
+            bucket: TokenBucket::full(now),
             unwritten: 0,
         }
     }
@@ -116,11 +116,11 @@ impl Line {
         let window = self.window_bytes().saturating_sub(self.in_flight);
         let tokens = self.bucket.tokens(now);
         let room = match self.pace {
-            Pace::Answers if !self.is_multiplexed => window,
-            Pace::Answers => window.min(tokens),
-            Pace::Asked { .. } => (MOST - self.in_flight.min(MOST)).min(tokens),
-            Pace::Silent if self.unwritten > 0 => 0,
-            Pace::Silent => tokens,
+            SendRate::ProbeReplies if !self.is_multiplexed => window,
+            SendRate::ProbeReplies => window.min(tokens),
+            SendRate::Asked { .. } => (MOST - self.in_flight.min(MOST)).min(tokens),
+            SendRate::Silent if self.unwritten > 0 => 0,
+            SendRate::Silent => tokens,
         };
         // Several slices fill a window, so that the line does not run dry while an answer is under way.
         let slice = (self.window_bytes() / 3).clamp(LEAST_SLICE, SLICE);
@@ -129,12 +129,12 @@ impl Line {
     }
 
     /// The question after the next slice.
-    pub(super) fn question(&self) -> Option<Question> {
-        (self.pace != Pace::Silent).then_some(Question::Status)
+    pub(super) fn question(&self) -> Option<QueryKind> {
+        (self.pace != SendRate::Silent).then_some(QueryKind::Status)
     }
 
     /// A slice goes out; its bytes with those of the question.
-    pub(super) fn send(&mut self, bytes: usize, question: Option<Question>, now: Instant) {
+    pub(super) fn send(&mut self, bytes: usize, question: Option<QueryKind>, now: Instant) {
         self.unwritten += bytes;
         self.bucket.take(bytes, now);
         let Some(question) = question else { return };
@@ -144,7 +144,7 @@ impl Line {
         self.in_flight += bytes;
         let is_limited =
             self.in_flight + LEAST_SLICE + SLICE.min(self.window_bytes() / 3) > self.window_bytes();
-        self.flight.push_back(Slice { question, bytes, sent: now, is_limited });
+        self.flight.push_back(SentSlice { question, bytes, sent: now, is_limited });
     }
 
     /// The system took so many bytes.
@@ -153,12 +153,12 @@ impl Line {
     }
 
     /// The terminal answered.
-    pub(super) fn answered(&mut self, question: Question, now: Instant) {
-        self.pace = Pace::Answers;
+    pub(super) fn answered(&mut self, question: QueryKind, now: Instant) {
+        self.pace = SendRate::ProbeReplies;
         self.heard = now;
         let Some(place) = self.flight.iter().position(|slice| slice.question == question) else { return };
         // Answers come in order: those before it are lost.
-        let passed: Vec<Slice> = self.flight.drain(..=place).collect();
+        let passed: Vec<SentSlice> = self.flight.drain(..=place).collect();
         for slice in passed {
             self.in_flight -= slice.bytes;
             // One larger than any window was a picture, and waited for itself.
@@ -175,14 +175,14 @@ impl Line {
     pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
         let filled = self.bucket.when(LEAST_SLICE + ASKED_BYTES, now);
         match self.pace {
-            Pace::Answers => {
+            SendRate::ProbeReplies => {
                 let lost = (!self.flight.is_empty()).then_some(self.heard + self.silence());
                 let filled = self.is_multiplexed.then_some(filled).filter(|filled| *filled > now);
                 [lost, filled].into_iter().flatten().min()
             }
-            Pace::Asked { until } if filled <= now => Some(until),
-            Pace::Asked { until } => Some(filled.min(until)),
-            Pace::Silent => (self.unwritten == 0).then_some(filled),
+            SendRate::Asked { until } if filled <= now => Some(until),
+            SendRate::Asked { until } => Some(filled.min(until)),
+            SendRate::Silent => (self.unwritten == 0).then_some(filled),
         }
     }
 
@@ -193,7 +193,7 @@ impl Line {
 
     /// Time until the terminal answers when the line is free. `None` if it does not answer.
     pub(super) fn round_trip(&self) -> Option<Duration> {
-        self.round_trips.least().filter(|_| self.pace == Pace::Answers)
+        self.round_trips.least().filter(|_| self.pace == SendRate::ProbeReplies)
     }
 
     /// Rate of the line, as far as it shows. `None` if it is faster than anybody would notice.
@@ -205,9 +205,9 @@ impl Line {
             Some(self.window / round_trip.max(1e-6))
         };
         let rate = match self.pace {
-            Pace::Answers if !self.is_multiplexed => by_window(),
-            Pace::Answers | Pace::Silent => Some(bucket::RATE),
-            Pace::Asked { .. } => None,
+            SendRate::ProbeReplies if !self.is_multiplexed => by_window(),
+            SendRate::ProbeReplies | SendRate::Silent => Some(bucket::RATE),
+            SendRate::Asked { .. } => None,
         };
         rate.filter(|rate| *rate < FAST)
     }
@@ -216,7 +216,7 @@ impl Line {
     /// half were answered within [`QUICK`].
     pub(super) fn is_quick(&self) -> bool {
         let quick = self.recent.iter().filter(|round_trip| **round_trip <= QUICK).count();
-        self.pace == Pace::Answers && !self.is_multiplexed && 2 * quick > self.recent.len()
+        self.pace == SendRate::ProbeReplies && !self.is_multiplexed && 2 * quick > self.recent.len()
     }
 
     fn note_recent(&mut self, round_trip: Duration) {
@@ -232,16 +232,16 @@ impl Line {
 
     fn lose_patience(&mut self, now: Instant) {
         match self.pace {
-            Pace::Asked { until } if now >= until => {
-                self.pace = Pace::Silent;
+            SendRate::Asked { until } if now >= until => {
+                self.pace = SendRate::Silent;
                 self.forget_flight();
             }
-            Pace::Answers if self.owes() && now >= self.heard + self.silence() => {
+            SendRate::ProbeReplies if self.owes() && now >= self.heard + self.silence() => {
                 // The line stands still, or an answer was lost. Little is sent until one comes.
                 self.forget_flight();
                 self.window = LEAST;
             }
-            Pace::Asked { .. } | Pace::Answers | Pace::Silent => {}
+            SendRate::Asked { .. } | SendRate::ProbeReplies | SendRate::Silent => {}
         }
     }
 
@@ -256,7 +256,7 @@ impl Line {
     }
 
     /// Fits the window to the queue that a slice met.
-    fn fit(&mut self, slice: &Slice, round_trip: Duration, now: Instant) {
+    fn fit(&mut self, slice: &SentSlice, round_trip: Duration, now: Instant) {
         let Some(least) = self.round_trips.least() else { return };
         let queue = round_trip.saturating_sub(least);
         if queue <= QUEUE {

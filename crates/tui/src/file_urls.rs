@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 /// The place that relative paths begin at, and the machine: a terminal may be on another one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Files {
+pub(super) struct FileUrls {
     folder: PathBuf,
     host: String,
 }
 
-impl Files {
+impl FileUrls {
     /// The files of this process, on this machine.
     pub(super) fn here() -> Self {
         // Elsewhere than on Linux, no name stands for the machine that the terminal is on.
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn paths_become_addresses() {
-        let files = Files { folder: "/home/ä".into(), host: "box".to_owned() };
+        let files = FileUrls { folder: "/home/ä".into(), host: "box".to_owned() };
         assert_eq!(files.address(Path::new("a b;%.png")), "file://box/home/%C3%A4/a%20b%3B%25.png");
         assert_eq!(files.address(Path::new("/tmp/x.png")), "file://box/tmp/x.png");
         assert_eq!(files.address(Path::new("\u{1b}\u{7}")), "file://box/home/%C3%A4/%1B%07");

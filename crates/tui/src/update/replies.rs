@@ -1,0 +1,249 @@
+//! Answers of the terminal about itself.
+
+use super::request::resized_preview;
+use super::say::say_until_key;
+use crate::color::{ColorDepth, Shades};
+use crate::event::Effect;
+use crate::graphics::Protocol;
+use crate::pixel_request::PixelRequest;
+use crate::preview_kind::PreviewKind;
+use crate::state::State;
+use crate::terminal_replies::BlockGlyphs;
+use crate::terminal_replies::TerminalReply;
+use crate::terminals::TerminalId;
+use crate::view::ramp;
+
+/// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
+pub(super) fn learn(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
+    let mut effects = judge(state, answer);
+    match answer {
+        TerminalReply::Name(terminal) => effects.extend(name(state, terminal)),
+        TerminalReply::Focus { is_here } => state.display.has_focus = is_here,
+        TerminalReply::TrueColor if state.display.ask.true_color => show(state, ColorDepth::TrueColor),
+        TerminalReply::Ink { index, rgb } if state.display.ask.palette => {
+            if let Some(ink) = state.display.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
+                *ink = rgb;
+                show(state, state.display.depth);
+            }
+        }
+        TerminalReply::Background(rgb) if state.display.ask.background => {
+            let is_light = ramp::is_light(rgb);
+            state.dirty |= std::mem::replace(&mut state.display.is_light, is_light) != is_light;
+        }
+        TerminalReply::Images(_)
+        | TerminalReply::TrueColor
+        | TerminalReply::Ink { .. }
+        | TerminalReply::Background(_)
+        | TerminalReply::Ready
+        | TerminalReply::Attributes
+        | TerminalReply::Synchronized { .. }
+        | TerminalReply::Other => {}
+    }
+    effects
+}
+
+/// What an answer says about requested pixels.
+enum PixelSupport {
+    Nothing,
+    Has,
+    Lacks,
+}
+
+fn verdict(request: PixelRequest, answer: TerminalReply) -> PixelSupport {
+    match answer {
+        TerminalReply::Images(protocol) if protocol == request.protocol => PixelSupport::Has,
+        TerminalReply::Name(terminal)
+            if request.protocol == Protocol::Iterm && terminal.brand.has_iterm_images() =>
+        {
+            PixelSupport::Has
+        }
+        TerminalReply::Attributes if request.ends_with_attributes() => PixelSupport::Lacks,
+        TerminalReply::Images(_)
+        | TerminalReply::Name(_)
+        | TerminalReply::Attributes
+        | TerminalReply::Ready
+        | TerminalReply::Synchronized { .. }
+        | TerminalReply::Focus { .. }
+        | TerminalReply::TrueColor
+        | TerminalReply::Background(_)
+        | TerminalReply::Ink { .. }
+        | TerminalReply::Other => PixelSupport::Nothing,
+    }
+}
+
+/// Draws in pixels from now on if the answer says that the terminal has them.
+fn judge(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
+    let Some(request) = state.display.pixels else { return Vec::new() };
+    match verdict(request, answer) {
+        PixelSupport::Nothing => Vec::new(),
+        PixelSupport::Lacks => {
+            lack_pixels(state);
+            Vec::new()
+        }
+        PixelSupport::Has => {
+            (state.display.pixels, state.display.pixels_until) = (None, None);
+            state.overlays.message.take_if(|message| message.words == request.refusal());
+            state.display.kind = PreviewKind::Pixels(request.protocol);
+            state.dirty = true;
+            resized_preview(state)
+        }
+    }
+}
+
+/// Says, once, that the terminal does not show pixels. A late answer is still heard.
+pub(super) fn lack_pixels(state: &mut State) {
+    let asked = state.display.pixels_until.take().and(state.display.pixels);
+    if let Some(request) = asked {
+        say_until_key(state, request.refusal());
+    }
+}
+
+fn show(state: &mut State, depth: ColorDepth) {
+    state.display.depth = depth;
+    state.display.shades = Shades::new(depth, &state.display.ansi);
+    state.dirty = true;
+}
+
+/// Takes the terminal's name: its blocks and its other abilities, if glimt asked for them.
+fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
+    let ask = state.display.ask;
+    let mut effects = Vec::new();
+    if ask.name {
+        let had_focus = std::mem::replace(&mut state.display.abilities, terminal.abilities()).focus;
+        effects.extend((state.display.abilities.focus && !had_focus).then_some(Effect::ReportFocus));
+        state.dirty = true;
+    }
+    if ask.blocks {
+        effects.extend(draw_in(state, BlockGlyphs::of(terminal)));
+    }
+    effects
+}
+
+fn draw_in(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
+    let kind = match blocks {
+        BlockGlyphs::Unknown => return Vec::new(),
+        BlockGlyphs::Sextants => PreviewKind::Sextant,
+        BlockGlyphs::Octants => PreviewKind::Octant,
+    };
+    if state.display.kind == PreviewKind::HalfBlock {
+        state.display.kind = kind;
+        state.dirty = true;
+    }
+    resized_preview(state)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::color::XTERM;
+    use crate::event::Event;
+    use crate::fixtures::{TestUi, state, state_with};
+    use crate::pipeline::protocol::Command;
+    use crate::pixel_request::ImageRoute;
+    use crate::terminal_replies::TerminalQueries;
+    use crate::terminals::{Brand, Capabilities};
+    use crate::update::start;
+
+    /// A desk of a user who wants kitty's images.
+    fn wanting_pixels(passage: ImageRoute) -> TestUi {
+        let mut state = state(80, 24);
+        let request = PixelRequest { protocol: Protocol::Kitty, passage, is_known: false };
+        state.display.pixels = Some(request);
+        state.display.pixels_until = Some(request.deadline(state.now));
+        TestUi::with(state)
+    }
+
+    #[test]
+    fn pixels_are_drawn_once_the_terminal_confirms_them() {
+        let mut ui = wanting_pixels(ImageRoute::Direct);
+        assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
+        let effects = ui.event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
+        assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
+        ui.event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.wait(2000);
+        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
+        assert_eq!(ui.state.overlays.message, None);
+    }
+
+    #[test]
+    fn a_terminal_without_pixels_is_told_of_and_gets_half_blocks() {
+        let mut ui = wanting_pixels(ImageRoute::Direct);
+        ui.event(Event::TerminalReply(TerminalReply::Attributes));
+        assert!(ui.text().contains("this terminal shows no kitty images"), "{}", ui.text());
+        assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
+        ui.press('s');
+        ui.event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.wait(2000);
+        assert!(!ui.text().contains("kitty images"), "said once: {}", ui.text());
+    }
+
+    #[test]
+    fn a_closed_tmux_is_told_of_after_a_second_and_a_late_answer_counts() {
+        let mut ui = wanting_pixels(ImageRoute::Tmux);
+        ui.event(Event::TerminalReply(TerminalReply::Attributes));
+        ui.wait(900);
+        assert_eq!(ui.state.overlays.message, None);
+        assert!(ui.state.next_tick().is_some_and(|tick| tick <= ui.now + Duration::from_millis(100)));
+        ui.wait(100);
+        assert!(ui.text().contains("allow-passthrough on"), "{}", ui.text());
+        ui.event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
+        assert_eq!(ui.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
+        assert!(!ui.text().contains("allow-passthrough"), "{}", ui.text());
+    }
+
+    #[test]
+    fn a_terminal_that_draws_octants_gets_a_finer_picture() {
+        let mut state = state(80, 24);
+        start(&mut state);
+        let before = state.request.preview_size.expect("a size");
+        let foot = TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] });
+        assert!(learn(&mut state, foot).is_empty(), "nobody asked");
+        assert_eq!(state.display.abilities, Capabilities::default());
+        state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
+        let effects = learn(&mut state, foot);
+        let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
+        assert_eq!(state.display.kind, PreviewKind::Octant);
+    }
+
+    #[test]
+    fn a_terminal_that_says_its_name_can_what_it_is_known_for() {
+        let mut state = state(80, 24);
+        state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
+        let ghostty = TerminalId { brand: Brand::Ghostty, version: [1, 2] };
+        assert!(matches!(learn(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
+        assert_eq!(state.display.abilities, ghostty.abilities());
+        assert!(learn(&mut state, TerminalReply::Name(ghostty)).is_empty(), "it reports the focus already");
+    }
+
+    #[test]
+    fn colors_and_background_are_believed_when_they_were_asked() {
+        let mut state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::Ansi16, Default::default());
+        let answers = [
+            TerminalReply::Ink { index: 1, rgb: [180, 30, 30] },
+            TerminalReply::Ink { index: 200, rgb: [180, 30, 30] },
+            TerminalReply::Background([255; 3]),
+            TerminalReply::TrueColor,
+        ];
+        for answer in answers {
+            learn(&mut state, answer);
+        }
+        assert_eq!(
+            (state.display.ansi, state.display.is_light, state.display.depth),
+            (XTERM, false, ColorDepth::Ansi16)
+        );
+        state.display.ask = TerminalQueries {
+            true_color: true,
+            background: true,
+            palette: true,
+            ..TerminalQueries::default()
+        };
+        for answer in answers {
+            learn(&mut state, answer);
+        }
+        assert_eq!(state.display.ansi[1], [180, 30, 30]);
+        assert_eq!((state.display.is_light, state.display.depth), (true, ColorDepth::TrueColor));
+    }
+}
