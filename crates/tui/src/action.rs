@@ -1,6 +1,6 @@
-//! The actions that keys trigger.
+//! Actions of keys.
 
-/// One thing that a person can ask for.
+/// An action that the user can trigger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Action {
     CycleShadows,

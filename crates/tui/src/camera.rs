@@ -1,25 +1,25 @@
-//! Moves of the camera by keys and the mouse. A moved camera has short numbers, so that glimt can write it into a scene as it is
-//! shown.
+//! Camera movement with keys and the mouse. Coordinates are rounded to few digits, so the camera can be
+//! written into a scene exactly as shown.
 
 use crate::math::DVec3;
 use crate::math::decimal::{decimal_step, rounded};
 use crate::pipeline::protocol::Viewpoint;
 use crate::scene::description::Pose;
 
-/// The eye keeps this angle from the axis that it goes around, in degrees.
+/// Minimum angle between the camera's arm and the orbit axis, in degrees.
 const POLE: f64 = 1.0;
-/// The field of view stays within these angles, in degrees.
+/// Range of the field of view, in degrees.
 const FIELD: (f64, f64) = (1.0, 160.0);
-/// Greatest ratio between the eye's distance and that of the scene's own camera, nearer and farther.
+/// Maximum ratio between the distance and the scene camera's distance, in both directions.
 pub(super) const REACH: f64 = 1000.0;
 
-/// Around `look_at`: so many degrees to the right and up.
+/// Orbits around `look_at` by `right` and `up` degrees.
 pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     let axis = pose.up.normalize_or(DVec3::Y);
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
     let polar = libm::acos((arm.dot(axis) / distance).clamp(-1.0, 1.0)).to_degrees();
-    // Whoever starts at a pole stays there until it is left.
+    // A camera that starts near a pole may stay there.
     let (least, most) = (POLE.min(polar), (180.0 - POLE).max(polar));
     let lifted = (polar - up).clamp(least, most);
     let level = (arm - axis * arm.dot(axis)).normalize_or(axis.any_orthonormal_vector());
@@ -29,7 +29,8 @@ pub(super) fn orbited(pose: &Pose, right: f64, up: f64) -> Pose {
     placed(pose, (level * sine + axis * cosine) * distance)
 }
 
-/// Towards `look_at`, or away from it: the distance becomes `factor` times as long, within reach of the scene's `own`.
+/// Moves the camera towards `look_at` or away from it, multiplying the distance by `factor` within [`REACH`]
+/// of the scene camera's distance `own`.
 pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     let arm = pose.position - pose.look_at;
     let distance = arm.length();
@@ -37,13 +38,13 @@ pub(super) fn dollied(pose: &Pose, factor: f64, own: f64) -> Pose {
     if wanted == distance { *pose } else { placed(pose, arm * (wanted / distance)) }
 }
 
-/// The field of view, `factor` times as wide.
+/// Multiplies the field of view by `factor`, within limits.
 pub(super) fn zoomed(view: &Viewpoint, factor: f64) -> f64 {
     let (least, most) = (FIELD.0.min(view.fov), FIELD.1.max(view.fov));
     rounded((view.fov * factor).clamp(least, most), 0.01)
 }
 
-/// With the eye at the end of this arm from `look_at`, to a hundred-thousandth of its length or better.
+/// Moves the eye to `look_at + arm`, rounded to 1/100,000 of the arm's length or better.
 fn placed(pose: &Pose, arm: DVec3) -> Pose {
     let step = decimal_step(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));
@@ -58,9 +59,9 @@ mod tests {
         Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::new(0.0, 1.0, 0.0), up: DVec3::Y };
 
     #[test]
-    fn the_eye_goes_around_what_it_looks_at() {
+    fn camera_orbits_around_look_at() {
         let right = orbited(&POSE, 90.0, 0.0);
-        assert_eq!(right.position, DVec3::new(4.0, 1.0, 0.0), "to the right is towards +x");
+        assert_eq!(right.position, DVec3::new(4.0, 1.0, 0.0), "right is +x");
         let up = orbited(&POSE, 0.0, 30.0);
         assert!((up.position - DVec3::new(0.0, 3.0, 4.0 * 0.75_f64.sqrt())).length() < 1e-4);
         let mut pose = POSE;
@@ -71,20 +72,20 @@ mod tests {
     }
 
     #[test]
-    fn the_poles_are_not_reached() {
+    fn orbit_stops_before_the_poles() {
         let mut pose = POSE;
         for _ in 0..100 {
             pose = orbited(&pose, 0.0, 5.0);
         }
         let arm = (pose.position - pose.look_at).normalize();
         assert!((arm.dot(DVec3::Y).acos().to_degrees() - POLE).abs() < 0.01, "{arm}");
-        assert!(arm.z > 0.0, "the eye did not go over the top");
+        assert!(arm.z > 0.0, "the camera did not pass the pole");
         let above = Pose { position: DVec3::new(0.0, 9.0, 0.0), up: DVec3::Y, look_at: DVec3::ZERO };
         assert!(orbited(&above, 10.0, -40.0).position.is_finite());
     }
 
     #[test]
-    fn dolly_and_zoom_have_their_ends() {
+    fn dolly_and_zoom_are_limited() {
         assert_eq!(dollied(&POSE, 0.5, 4.0).position, DVec3::new(0.0, 1.0, 2.0));
         for (factor, end) in [(0.5, 0.004), (2.0, 4000.0)] {
             let mut pose = POSE;
@@ -92,13 +93,13 @@ mod tests {
                 pose = dollied(&pose, factor, 4.0);
             }
             assert!((pose.distance() / end - 1.0).abs() < 1e-4, "{}", pose.distance());
-            assert_eq!(dollied(&pose, factor, 4.0), pose, "the end is the end");
+            assert_eq!(dollied(&pose, factor, 4.0), pose, "no further movement");
         }
         let far = Pose { position: DVec3::new(0.0, 1.0, 1e6), ..POSE };
-        assert_eq!(dollied(&far, 2.0, 4.0), far, "one that is farther stays where it is");
+        assert_eq!(dollied(&far, 2.0, 4.0), far, "a farther camera is kept");
         let view = Viewpoint { pose: POSE, fov: 40.0, aperture: 0.0, focus: 4.0 };
         assert_eq!(zoomed(&view, 1.1), 44.0);
         assert_eq!(zoomed(&view, 100.0), 160.0);
-        assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "one that is wider stays as it is");
+        assert_eq!(zoomed(&Viewpoint { fov: 170.0, ..view }, 1.1), 170.0, "a wider field is kept");
     }
 }

@@ -1,4 +1,4 @@
-//! The display: leads the screen to the requested cells, slice by slice as the line has room.
+//! Sends the target cells to the terminal, slice by slice as bandwidth permits.
 
 use std::time::{Duration, Instant};
 
@@ -16,87 +16,87 @@ use super::terminal_replies::TerminalQueries;
 use super::terminal_replies::TerminalReply;
 use super::window_title::WindowTitle;
 
-/// Whether the terminal draws what lies between two marks at once (mode 2026).
+/// Query for synchronized output (mode 2026).
 pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
-/// Question for the device attributes (DA1): the last of the first questions.
+/// Query for the primary device attributes (DA1), the last one of the first batch.
 pub(super) const ATTRIBUTES: &[u8] = b"\x1b[c";
-/// A status report (DSR).
+/// Request for a status report (DSR).
 pub(super) const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
-/// The way to the terminal, as far as it is known before anything was sent.
+/// What the environment says about the terminal and the connection to it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TerminalLink {
-    /// Inside tmux or screen, which answer themselves and draw when they like.
+    /// Runs inside tmux or screen, which answer queries themselves and delay drawing.
     pub(super) is_multiplexed: bool,
-    /// Inside tmux.
+    /// Runs inside tmux.
     pub(super) is_in_tmux: bool,
-    /// Over a network.
+    /// Runs over a network connection.
     pub(super) is_remote: bool,
-    /// Whether the terminal knows REP.
+    /// Whether the terminal supports REP.
     pub(super) can_repeat: bool,
-    /// Questions to the terminal.
+    /// Queries to send.
     pub(super) ask: TerminalQueries,
 }
 
 impl TerminalLink {
-    /// Nothing is known of the line yet. What answers inside a multiplexer says nothing of a network behind it.
-    fn line(self, now: Instant) -> Connection {
+    /// A connection of unknown speed. Replies of a local multiplexer say nothing about a network behind it.
+    fn connection(self, now: Instant) -> Connection {
         Connection::new(self.is_multiplexed && self.is_remote, now)
     }
 }
 
-/// A writer to the terminal that does not wait until the bytes are written.
+/// A nonblocking writer to the terminal.
 pub(super) type TerminalWriter = Box<dyn FnMut(Vec<u8>)>;
 
-/// The screen as the loop sees it.
+/// The terminal's screen as the event loop sees it.
 pub(super) struct Display {
     painter: Painter,
-    /// The picture, if it is drawn in pixels.
+    /// The preview, if it is drawn as pixels.
     images: Option<Images>,
-    line: Connection,
-    way: TerminalLink,
-    /// Takes bytes for the terminal.
+    connection: Connection,
+    link: TerminalLink,
+    /// Sends bytes to the terminal.
     out: TerminalWriter,
-    /// Whether the terminal knows mode 2026.
+    /// Whether the terminal supports mode 2026.
     is_synchronized: bool,
-    /// Whether all that is wanted has been sent.
+    /// Whether the target has been sent completely.
     is_complete: bool,
-    /// The frame of the window as it is wanted, and as it was sent.
-    chrome: [WindowTitle; 2],
-    /// Notifications and texts for the clipboard, not sent yet.
+    /// The current window title and the one sent last.
+    window_titles: [WindowTitle; 2],
+    /// Notifications and clipboard texts to send.
     asides: Vec<u8>,
-    /// Bytes that were sent since the render of the newest picture began.
+    /// Bytes sent since the render of the newest preview began.
     sent: usize,
-    /// Whether a picture is under way.
+    /// Whether a preview is being sent.
     is_picture_due: bool,
-    /// Cost of the last picture.
+    /// Cost of the last preview.
     report: Option<FrameReport>,
-    /// Whether that is news.
+    /// Whether `report` has been returned.
     is_reported: bool,
 }
 
 impl Display {
-    /// A screen of which nothing is known.
+    /// A display whose content is unknown.
     pub(super) fn new(
         depth: ColorDepth,
-        way: TerminalLink,
+        link: TerminalLink,
         images: Option<Images>,
         out: TerminalWriter,
         now: Instant,
     ) -> Self {
         let mut display = Self {
-            painter: Painter::new(depth).repeating(way.can_repeat),
+            painter: Painter::new(depth).repeating(link.can_repeat),
             images,
-            line: way.line(now),
-            way,
+            connection: link.connection(now),
+            link,
             out,
             is_synchronized: false,
             is_complete: true,
-            chrome: Default::default(),
+            window_titles: Default::default(),
             asides: Vec::new(),
             sent: 0,
             is_picture_due: false,
@@ -107,16 +107,16 @@ impl Display {
         display
     }
 
-    /// Somebody else used the terminal: its content is unknown, and so is the line.
+    /// Resets screen and connection after another program has used the terminal.
     pub(super) fn restart(&mut self, now: Instant) {
         self.forget();
-        self.chrome[1] = WindowTitle::default();
-        self.line = self.way.line(now);
-        let questions = [SYNCHRONIZED, &self.way.ask.questions(), ATTRIBUTES].concat();
+        self.window_titles[1] = WindowTitle::default();
+        self.connection = self.link.connection(now);
+        let questions = [SYNCHRONIZED, &self.link.ask.questions(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
     }
 
-    /// The content of the screen is unknown; the line is the same.
+    /// Marks the content of the screen as unknown.
     pub(super) fn forget(&mut self) {
         self.painter.forget();
         if let Some(images) = &mut self.images {
@@ -125,65 +125,65 @@ impl Display {
         self.is_complete = false;
     }
 
-    /// Draws the picture in pixels from now on, if that is its kind.
+    /// Switches to drawing the preview as pixels if `kind` requires it.
     pub(super) fn draw_as(&mut self, kind: PreviewKind) {
         if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
             terminal::will_have_images();
-            self.images = Some(Images::new(protocol, self.way.is_in_tmux));
+            self.images = Some(Images::new(protocol, self.link.is_in_tmux));
         }
     }
 
-    /// Whether the picture is drawn in pixels.
+    /// Whether the preview is drawn as pixels.
     pub(super) fn draws_pixels(&self) -> bool {
         self.images.is_some()
     }
 
-    /// Places the picture in pixels. `None` if cells take its place.
+    /// Places the preview in pixels. `None` if it is drawn with cells.
     pub(super) fn place(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
         if let Some(uncovered) = self.images.as_mut().and_then(|images| images.aim(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
     }
 
-    /// Leads to this from now on. `is_new`: with a picture that was not wanted before.
+    /// Sets a new target. `is_new` if it contains a new preview.
     pub(super) fn aim(
         &mut self,
         wanted: &Buffer,
         picture: Rect,
         fidelity: Fidelity,
-        (is_new, besides): (bool, &FrameExtras),
+        (is_new, extras): (bool, &FrameExtras),
     ) {
-        if !besides.links.is_empty() {
+        if !extras.links.is_empty() {
             terminal::will_have_links();
         }
-        self.painter.aim_with(wanted, picture, fidelity, besides);
+        self.painter.aim_with(wanted, picture, fidelity, extras);
         self.is_complete = false;
         self.is_picture_due |= is_new;
     }
 
-    /// The first picture of a render is the next one: bytes are counted from here on.
+    /// Starts counting bytes for a new render.
     pub(super) fn begin_count(&mut self) {
         self.sent = 0;
     }
 
-    /// Gives the window this frame, behind the picture.
-    pub(super) fn dress(&mut self, chrome: WindowTitle) {
-        self.chrome[0] = chrome;
+    /// Sets the window title, which is sent after the preview.
+    pub(super) fn dress(&mut self, title: WindowTitle) {
+        self.window_titles[0] = title;
     }
 
-    /// Sends these bytes behind the picture.
+    /// Queues bytes to send after the preview.
     pub(super) fn send_aside(&mut self, bytes: Vec<u8>) {
         self.asides.extend(bytes);
     }
 
-    /// Whether there is anything to send when the picture is there.
+    /// Whether anything is queued to be sent after the preview.
     fn has_more(&self) -> bool {
-        !self.asides.is_empty() || self.chrome[0] != self.chrome[1]
+        !self.asides.is_empty() || self.window_titles[0] != self.window_titles[1]
     }
 
-    /// Sends what waits for the picture.
+    /// Sends everything queued to be sent after the preview.
     fn send_more(&mut self, now: Instant) {
-        let [wanted, sent] = &self.chrome;
+        let [wanted, sent] = &self.window_titles;
         let mut bytes = Vec::new();
         if wanted.title != sent.title {
             bytes.extend_from_slice(terminal::before_title());
@@ -193,16 +193,16 @@ impl Display {
         }
         bytes.extend(sent.changes(wanted));
         bytes.append(&mut self.asides);
-        self.chrome[1] = self.chrome[0].clone();
+        self.window_titles[1] = self.window_titles[0].clone();
         if !bytes.is_empty() {
             self.send_slice(bytes, now);
         }
     }
 
-    /// Sends a slice of what the line has room for, and what there is of it once `is_late` says so; whether that was anything.
+    /// Sends one slice, cut short once `is_late` returns true. Returns whether anything was sent.
     pub(super) fn pump(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let is_idle = self.is_complete && !self.has_more();
-        let room = if is_idle { 0 } else { self.line.room(now) };
+        let room = if is_idle { 0 } else { self.connection.room(now) };
         if room == 0 {
             return false;
         }
@@ -216,8 +216,9 @@ impl Display {
             self.send_slice(self.synchronized(cells), now);
             return true;
         }
-        // Without marks: kitty 0.26 loses chunks of a picture that come between them. It is shown by its last one.
-        let rate = self.line.bytes_per_second();
+        // Not as synchronized output: kitty 0.26 loses chunks of an image there. The last chunk shows the
+        // image.
+        let rate = self.connection.bytes_per_second();
         let pixels = self.images.as_mut().and_then(|images| images.slice(room, rate));
         match pixels {
             Some(pixels) => self.send_slice(pixels, now),
@@ -226,9 +227,9 @@ impl Display {
         !self.is_complete
     }
 
-    /// The same between marks, if the terminal knows them and it is large enough to flicker.
+    /// Wraps a slice as synchronized output if it is large enough to flicker and the terminal supports it.
     fn synchronized(&self, mut cells: Vec<u8>) -> Vec<u8> {
-        if self.is_synchronized && !self.way.is_multiplexed && cells.len() >= LARGE {
+        if self.is_synchronized && !self.link.is_multiplexed && cells.len() >= LARGE {
             cells.splice(0..0, BEGIN.iter().copied());
             cells.extend_from_slice(END);
         }
@@ -238,13 +239,13 @@ impl Display {
     fn complete(&mut self) {
         self.is_complete = true;
         if std::mem::take(&mut self.is_picture_due) {
-            self.report = Some(FrameReport { bytes: self.sent, round_trip: self.line.round_trip() });
+            self.report = Some(FrameReport { bytes: self.sent, round_trip: self.connection.round_trip() });
             self.is_reported = false;
         }
     }
 
     fn send_slice(&mut self, mut slice: Vec<u8>, now: Instant) {
-        let question = self.line.question();
+        let question = self.connection.question();
         if question.is_some() {
             slice.extend_from_slice(STATUS);
         }
@@ -253,15 +254,15 @@ impl Display {
     }
 
     fn send(&mut self, bytes: Vec<u8>, question: Option<QueryKind>, now: Instant) {
-        self.line.send(bytes.len(), question, now);
+        self.connection.send(bytes.len(), question, now);
         (self.out)(bytes);
     }
 
-    /// The terminal answered.
+    /// Handles a reply of the terminal.
     pub(super) fn answered(&mut self, answer: TerminalReply, now: Instant) {
         match answer {
-            TerminalReply::Ready => self.line.answered(QueryKind::Status, now),
-            TerminalReply::Attributes => self.line.answered(QueryKind::Attributes, now),
+            TerminalReply::Ready => self.connection.answered(QueryKind::Status, now),
+            TerminalReply::Attributes => self.connection.answered(QueryKind::Attributes, now),
             TerminalReply::Synchronized { is_known } => self.is_synchronized = is_known,
             TerminalReply::Name(_)
             | TerminalReply::Focus { .. }
@@ -273,56 +274,56 @@ impl Display {
         }
     }
 
-    /// The system took so many bytes.
+    /// Records bytes that the system has accepted.
     pub(super) fn written(&mut self, bytes: usize) {
-        self.line.written(bytes);
+        self.connection.written(bytes);
     }
 
-    /// Whether all that is wanted has been sent.
+    /// Whether the target has been sent completely.
     pub(super) fn is_complete(&self) -> bool {
         self.is_complete
     }
 
-    /// Whether the terminal can follow the render.
-    pub(super) fn is_quick(&self) -> bool {
-        self.line.is_quick()
+    /// Whether the terminal is fast enough to follow the render.
+    pub(super) fn is_fast(&self) -> bool {
+        self.connection.is_fast()
     }
 
-    /// Whether the terminal has answered for all that is wanted.
+    /// Whether the terminal has acknowledged the complete target.
     pub(super) fn is_answered(&self) -> bool {
-        self.is_complete && !self.line.owes()
+        self.is_complete && !self.connection.awaits_reply()
     }
 
-    /// Rate of the line, as far as it shows. `None` if it is faster than anybody would notice.
+    /// Estimated bandwidth in bytes per second. `None` if it is too high to matter.
     pub(super) fn bytes_per_second(&self) -> Option<f64> {
-        self.line.bytes_per_second()
+        self.connection.bytes_per_second()
     }
 
-    /// When there may be room for what is left, without an answer.
+    /// Time at which more can be sent even without a reply.
     pub(super) fn wake(&mut self, now: Instant) -> Option<Instant> {
         match () {
             () if self.is_complete && !self.has_more() => None,
-            () if self.line.room(now) > 0 => Some(now),
-            () => self.line.wake(now),
+            () if self.connection.room(now) > 0 => Some(now),
+            () => self.connection.wake(now),
         }
     }
 
-    /// The report on the last picture, once, and again when the terminal's first answer came after it.
+    /// Returns the report on the last preview once, and again when the first round trip has been measured.
     pub(super) fn take_report(&mut self) -> Option<FrameReport> {
         let report = self.report.as_mut()?;
-        if report.round_trip.is_none() && self.line.round_trip().is_some() {
-            report.round_trip = self.line.round_trip();
+        if report.round_trip.is_none() && self.connection.round_trip().is_some() {
+            report.round_trip = self.connection.round_trip();
             self.is_reported = false;
         }
         (!std::mem::replace(&mut self.is_reported, true)).then_some(*report)
     }
 
-    /// Time to wait for answers that would otherwise be typed into the shell. `None` if no answer is due.
+    /// Time to wait for replies that would otherwise end up in the shell. `None` if none is due.
     pub(super) fn patience(&self) -> Option<Duration> {
         const LEAST: Duration = Duration::from_millis(200);
         const MOST: Duration = Duration::from_secs(1);
-        let round_trip = self.line.round_trip().unwrap_or_default();
-        self.line.owes().then(|| (round_trip * 3 / 2).clamp(LEAST, MOST))
+        let round_trip = self.connection.round_trip().unwrap_or_default();
+        self.connection.awaits_reply().then(|| (round_trip * 3 / 2).clamp(LEAST, MOST))
     }
 }
 
@@ -335,9 +336,9 @@ mod tests {
 
     use super::*;
 
-    /// A small difference of a picture does not stand for the picture.
+    /// A small update of a preview does not count as its size.
     #[test]
-    fn the_bytes_of_a_picture_are_those_since_its_render_began() {
+    fn report_counts_bytes_since_the_render_began() {
         let now = Instant::now();
         let all = Rc::new(Cell::new(0));
         let count = all.clone();
@@ -372,6 +373,6 @@ mod tests {
         display.begin_count();
         buffer.content[9].set_fg(Color::Rgb(255, 255, 255));
         let (told, difference) = show(&mut display, &buffer);
-        assert_eq!(told, difference, "of another render");
+        assert_eq!(told, difference, "the next render");
     }
 }

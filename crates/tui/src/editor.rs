@@ -1,4 +1,4 @@
-//! A person's own editor, in the foreground of the same terminal.
+//! Runs the user's editor in the same terminal.
 
 use std::ffi::{OsStr, OsString};
 use std::io;
@@ -13,15 +13,16 @@ use nix::unistd::Pid;
 use super::event::FilePosition;
 use super::signals;
 
-/// The editor, if the environment names none.
+/// Editor to use if the environment names none.
 const DEFAULT: &str = "vi";
 
-/// The editor that the environment names: words for a shell.
+/// The editor from the environment, as a shell command.
 pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
     editor(variable).0
 }
 
-/// The editor that the environment names, as words for a shell, and the variable that names it. `None` for that if none does.
+/// The editor from the environment, as a shell command, and the variable that names it. `None` for the
+/// default editor.
 pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
     let set = |name: &'static str| {
         let editor = variable(name).filter(|value| !value.trim().is_empty())?;
@@ -30,23 +31,23 @@ pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'st
     set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| (DEFAULT.to_owned(), None))
 }
 
-/// Runs the editor at this place until it ends. Where it is stopped, so is this program, until both are continued. A
-/// signal that ends this program ends it as well.
+/// Runs the editor at a position in a file until it exits. If the editor is stopped, this process stops as
+/// well until both are continued. Terminating signals are forwarded.
 ///
 /// # Errors
-/// It could not be started, or says that it failed.
+/// The editor could not be started or failed.
 pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     let failed = |error: io::Error| format!("cannot start the editor `{editor}`: {error}");
     let mut shell = Command::new("/bin/sh");
     shell.arg("-c").arg(line(editor)).arg(editor).args(arguments(editor, place));
     let child = shell.spawn().map_err(failed)?;
-    let id = i32::try_from(child.id()).map_err(|_| format!("the editor `{editor}` is lost"))?;
+    let id = i32::try_from(child.id()).map_err(|_| format!("lost track of the editor `{editor}`"))?;
     let id = Pid::from_raw(id);
     signals::set_child(Some(id));
     let end = wait(id);
     signals::set_child(None);
     match end {
-        // Those that keys send are the editor's to end by.
+        // Signals from the keyboard are a normal way to end an editor.
         Ok(WaitStatus::Exited(_, 0) | WaitStatus::Signaled(_, Signal::SIGINT | Signal::SIGQUIT, _)) => Ok(()),
         Ok(WaitStatus::Exited(_, 127)) => Err(format!("there is no editor `{editor}`: set VISUAL or EDITOR")),
         Ok(WaitStatus::Exited(_, code)) => Err(format!("the editor `{editor}` ended with code {code}")),
@@ -56,7 +57,7 @@ pub(super) fn run(editor: &str, place: &FilePosition) -> Result<(), String> {
     }
 }
 
-/// Waits for the end of a child.
+/// Waits for the child to exit.
 fn wait(id: Pid) -> Result<WaitStatus, Errno> {
     loop {
         match waitpid(id, Some(WaitPidFlag::WUNTRACED)) {
@@ -68,8 +69,8 @@ fn wait(id: Pid) -> Result<WaitStatus, Errno> {
     }
 }
 
-/// Command line for the shell. The editor takes the shell's place where words are plain: a shell in between would keep signals
-/// from the editor.
+/// Command line for the shell. Simple commands replace the shell with `exec`, because a shell in between
+/// would intercept signals.
 fn line(editor: &str) -> String {
     let is_plain = |character: char| character.is_alphanumeric() || " -_./+,:@%".contains(character);
     let is_of_shell = ["command", "eval", "exec", "time", "."].contains(&program(editor));
@@ -77,10 +78,10 @@ fn line(editor: &str) -> String {
     format!("{exec}{editor} \"$@\"")
 }
 
-/// Arguments that lead an editor to a place.
+/// Arguments that open a position in a file.
 fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
     let FilePosition { path, line, column } = place;
-    // A name that begins with a dash is no option.
+    // A name that starts with a dash is not an option.
     let path = if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
         Path::new(".").join(path)
     } else {
@@ -101,12 +102,12 @@ fn arguments(editor: &str, place: &FilePosition) -> Vec<OsString> {
                 if editor.contains(" -g") || editor.contains("--goto") { None } else { Some("-g".into()) };
             wait.into_iter().chain(goto).chain([with_place()]).collect()
         }
-        // Nobody knows how to tell other editors.
+        // The syntax of other editors is unknown.
         _ => vec![path.into()],
     }
 }
 
-/// The name of the program, without folder and options.
+/// File name of the editor's program.
 fn program(editor: &str) -> &str {
     let first = editor.split_whitespace().next().unwrap_or_default();
     Path::new(first).file_name().and_then(OsStr::to_str).unwrap_or(first)
@@ -117,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn visual_goes_before_editor() {
+    fn visual_is_preferred_to_editor() {
         let of = |pairs: &[(&str, &str)]| {
             name(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
         };
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn only_plain_words_take_the_place_of_the_shell() {
+    fn only_simple_commands_replace_the_shell() {
         assert_eq!(line("/usr/bin/nvim -u NONE"), "exec /usr/bin/nvim -u NONE \"$@\"");
         for editor in ["TERM=vt100 vi", "cd /; vi", "'my editor'", "vi #", "$HOME/vi", "command vi"] {
             assert_eq!(line(editor), format!("{editor} \"$@\""));
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn each_editor_is_led_to_the_line_in_its_way() {
+    fn editors_open_the_line() {
         let place = FilePosition { path: "a b.toml".into(), line: 7, column: 3 };
         for (editor, expected) in [
             ("vi", "+7 a b.toml"),

@@ -1,4 +1,4 @@
-//! Knowledge about the terminal, and about the way to it, from the environment.
+//! What the environment says about the terminal and the connection to it.
 
 use super::color::{ColorChoice, ColorDepth};
 use super::display::TerminalLink;
@@ -9,8 +9,8 @@ use super::pixel_request::PixelRequest;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
 
-/// The way to the terminal, from the environment.
-pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> TerminalLink {
+/// The terminal and its connection, from environment variables.
+pub(super) fn terminal_link(variable: impl Fn(&str) -> Option<String>) -> TerminalLink {
     let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
     let term = variable("TERM").unwrap_or_default();
     TerminalLink {
@@ -25,14 +25,14 @@ pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> TerminalLink {
     }
 }
 
-/// Whether the terminal may print sequences that it does not know, as the Linux console and Apple's terminal do.
+/// Whether the terminal may print unknown sequences, as the Linux console and Apple's Terminal do.
 pub(super) fn is_plain(variable: impl Fn(&str) -> Option<String>) -> bool {
     let term = variable("TERM").unwrap_or_default();
     ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
 }
 
-/// The protocol of a choice of pixels.
+/// The image protocol of a preview choice.
 fn protocol(preview: PreviewChoice) -> Option<Protocol> {
     match preview {
         PreviewChoice::Kitty => Some(Protocol::Kitty),
@@ -48,7 +48,7 @@ fn protocol(preview: PreviewChoice) -> Option<Protocol> {
     }
 }
 
-/// Questions to ask the terminal. Multiplexers answer for themselves or not at all; plain terminals may print them.
+/// Queries to send. Multiplexers answer for themselves or not at all, and plain terminals may print queries.
 pub(super) fn ask(
     preview: PreviewChoice,
     color: ColorChoice,
@@ -57,7 +57,7 @@ pub(super) fn ask(
 ) -> TerminalQueries {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
-    let is_outermost = !way(&variable).is_multiplexed;
+    let is_outermost = !terminal_link(&variable).is_multiplexed;
     let is_plain = is_plain(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
     let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
@@ -76,21 +76,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn multiplexers_and_networks_are_known_by_their_variables() {
-        let way = |pairs: &[(&str, &str)]| {
-            way(|name| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()))
+    fn multiplexers_and_networks_are_detected() {
+        let link = |pairs: &[(&str, &str)]| {
+            terminal_link(|name| {
+                pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+            })
         };
-        assert!(!way(&[("TERM", "xterm-256color"), ("TMUX", "")]).is_multiplexed);
-        assert!(way(&[("TERM", "xterm-256color"), ("TMUX", "/tmp/tmux-0/default,1,0")]).is_multiplexed);
-        assert!(way(&[("TERM", "tmux-256color")]).is_multiplexed);
-        assert!(way(&[("TERM", "screen.xterm-256color")]).is_multiplexed);
-        assert!(way(&[("STY", "1234.pts-0")]).is_multiplexed);
-        assert!(way(&[("SSH_CONNECTION", "10.0.0.1 5000 10.0.0.2 22")]).is_remote);
-        assert!(!way(&[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_TTY", "")]).is_remote);
+        assert!(!link(&[("TERM", "xterm-256color"), ("TMUX", "")]).is_multiplexed);
+        assert!(link(&[("TERM", "xterm-256color"), ("TMUX", "/tmp/tmux-0/default,1,0")]).is_multiplexed);
+        assert!(link(&[("TERM", "tmux-256color")]).is_multiplexed);
+        assert!(link(&[("TERM", "screen.xterm-256color")]).is_multiplexed);
+        assert!(link(&[("STY", "1234.pts-0")]).is_multiplexed);
+        assert!(link(&[("SSH_CONNECTION", "10.0.0.1 5000 10.0.0.2 22")]).is_remote);
+        assert!(!link(&[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_TTY", "")]).is_remote);
     }
 
     #[test]
-    fn a_terminal_is_asked_what_is_not_known_of_it() {
+    fn only_unknown_facts_are_queried() {
         let ask = |preview, color, depth, pairs: &[(&str, &str)]| {
             ask(preview, color, depth, |name| {
                 pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())

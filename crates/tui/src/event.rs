@@ -1,4 +1,4 @@
-//! Everything that can happen to the front end: one closed set.
+//! Events and effects of the front end.
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -12,29 +12,29 @@ use super::terminal_replies::TerminalReply;
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, PreviewSource, Section};
 
-/// One thing that happened.
+/// An input of the front end.
 #[derive(Clone, Debug)]
 pub(super) enum Event {
-    /// A key was pressed.
+    /// A key press.
     Key(KeyPress),
-    /// The mouse was used.
+    /// A mouse action.
     Mouse(Mouse),
-    /// Text was pasted.
+    /// Pasted text, whose content is ignored.
     Paste,
-    /// The terminal answered a question.
+    /// A reply or report from the terminal.
     TerminalReply(TerminalReply),
-    /// The system took so many bytes for the terminal.
+    /// The system has accepted bytes for the terminal.
     Written { bytes: usize },
-    /// The terminal cannot be written to.
+    /// Writing to the terminal failed.
     Unwritable(ErrorKind),
-    /// A picture has been sent.
+    /// A preview has been sent.
     Frame(FrameReport),
-    /// The window has this size now.
+    /// The window size may have changed.
     Resize(Window),
-    /// The worker says something. Pictures come as [`Event::Picture`].
+    /// A message from the worker. Previews arrive as [`Event::Picture`].
     Worker(protocol::Event),
-    /// The newest picture of the slot. `range`: its least and greatest number, if it is stretched to them. `section`: the part of
-    /// the image that it shows pixel by pixel.
+    /// A new preview. `range` is the range of values that it shows, if it was mapped to a range. `section` is
+    /// the part of the image that it shows pixel by pixel.
     Picture {
         generation: u64,
         picture: Arc<Picture>,
@@ -45,28 +45,28 @@ pub(super) enum Event {
     },
     /// A file that the scene depends on was written.
     Changed(Changed),
-    /// Nobody is writing the changed files any more.
+    /// Writing of the changed files has ended.
     Settled,
-    /// A file that glimt wrote was changed, or is as glimt wrote it again.
+    /// An output file was changed by another program, or restored.
     Output(OutputChange),
-    /// A signal, or what amounts to one.
+    /// A signal or an equivalent event.
     Signal(Signal),
-    /// A frame with the picture of this generation is on the screen.
+    /// The first bytes of a preview of this request have been sent.
     Shown { generation: u64 },
-    /// Time passed.
+    /// Time has passed.
     Tick,
-    /// Ctrl-z where nothing could continue the program again.
+    /// Ctrl-z was pressed, but no shell could continue the process.
     NoShell,
-    /// The terminal is back from the editor.
+    /// The editor has exited.
     Back,
-    /// The editor could not be used: why.
+    /// The editor could not be run, with the reason.
     NoEditor(String),
-    /// A source of events ended.
+    /// A source of events has ended.
     Lost(EventSource),
 }
 
 impl Event {
-    /// The event for the watcher's news.
+    /// Wraps an event of the file watcher.
     pub(super) fn of_watcher(news: News) -> Self {
         match news {
             News::Changed(changed) => Self::Changed(changed),
@@ -76,7 +76,7 @@ impl Event {
     }
 }
 
-/// A key with its modifiers.
+/// A key with modifiers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct KeyPress {
     pub code: KeyCode,
@@ -94,54 +94,54 @@ impl KeyPress {
         Self { code: KeyCode::Char(character), modifiers: KeyModifiers::CONTROL }
     }
 
-    /// A key that is no character.
+    /// A key that is not a character.
     pub(super) const fn special(code: KeyCode) -> Self {
         Self { code, modifiers: KeyModifiers::NONE }
     }
 }
 
-/// The left button or the wheel, over a cell.
+/// A mouse event over a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mouse {
     pub kind: MouseKind,
-    /// From 0.
+    /// Counted from 0.
     pub column: u16,
-    /// From 0.
+    /// Counted from 0.
     pub row: u16,
 }
 
-/// Actions of the mouse.
+/// Kinds of mouse events: the left button and the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MouseKind {
     Press,
-    /// Moved while pressed.
+    /// Moved while the button is down.
     Drag,
     Release,
     WheelUp,
     WheelDown,
 }
 
-/// The terminal's window.
+/// Size of the terminal's window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Window {
     pub columns: u16,
     pub rows: u16,
-    /// Height of a cell over its width.
+    /// Height of a cell divided by its width.
     pub cell_aspect: f32,
-    /// Width and height of a cell in pixels; likely ones if the terminal does not report them.
+    /// Size of a cell in pixels; a typical one if the terminal does not report it.
     pub cell_pixels: (u16, u16),
 }
 
-/// The signals that are handled.
+/// Signals that the event loop handles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Signal {
     Interrupt,
     Terminate,
     /// SIGQUIT.
     Quit,
-    /// SIGHUP, or the terminal is gone without one.
+    /// SIGHUP, or the terminal is gone.
     Hangup,
-    /// One that ends every program that does not know it, by its number.
+    /// Another terminating signal, by number.
     Other(i32),
     /// SIGTSTP.
     Suspend,
@@ -151,7 +151,7 @@ pub(super) enum Signal {
     Resize,
 }
 
-/// Sources of events.
+/// Sources of events that must not end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum EventSource {
     Worker,
@@ -159,58 +159,58 @@ pub(super) enum EventSource {
     Keys,
 }
 
-/// Side effects that the loop carries out.
+/// Side effects for the event loop to carry out.
 #[derive(Clone, Debug)]
 pub(super) enum Effect {
-    /// An order for the worker.
+    /// Send a command to the worker.
     Send(protocol::Command),
-    /// Restore the terminal and end.
+    /// Restore the terminal and exit.
     Quit(super::ExitStatus),
-    /// The worker is gone: restore the terminal and end with an error.
+    /// The worker has ended: restore the terminal and exit with an error.
     GiveUp,
-    /// Ctrl-z: stop the whole job, as the terminal would.
+    /// Ctrl-z: stop the whole job.
     StopJob,
-    /// SIGTSTP came: restore the terminal, stop, and take it again.
+    /// SIGTSTP: restore the terminal and stop.
     Suspend,
-    /// SIGCONT came: take the terminal again and draw everything.
+    /// SIGCONT: set up the terminal again and redraw everything.
     Redraw,
-    /// Whether the terminal is to report the mouse.
+    /// Enable or disable mouse reports.
     Mouse(bool),
-    /// Leave the terminal to the editor, at this place.
+    /// Run the editor at this position.
     Edit(FilePosition),
-    /// Ask how large the window is.
+    /// Query the window size.
     Measure,
-    /// Send this behind the picture: a notification, a text for the clipboard.
+    /// Send bytes after the preview: a notification or clipboard text.
     Aside(Vec<u8>),
-    /// Have the terminal report the focus from now on.
+    /// Enable focus reports.
     ReportFocus,
 }
 
-/// A place in a file.
+/// A position in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FilePosition {
     pub path: PathBuf,
-    /// From 1.
+    /// Counted from 1.
     pub line: usize,
-    /// From 1.
+    /// Counted from 1.
     pub column: usize,
 }
 
-/// Cost of the last picture on its way to the screen.
+/// Cost of sending the last preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FrameReport {
-    /// Bytes that were sent since its render began.
+    /// Bytes sent since the render began.
     pub bytes: usize,
-    /// Time until the terminal answers. `None` if it does not.
+    /// Round-trip time of the terminal. `None` if it does not reply.
     pub round_trip: Option<Duration>,
 }
 
-/// Why a picture is not on disk although it is to be.
+/// Why an image that should be on disk is not.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WriteFailure {
     pub why: String,
-    /// Number of the request.
+    /// Generation of the request.
     pub generation: u64,
-    /// Whether it is refused, for a reason that is among the errors and warnings.
+    /// Whether writing was refused for a reason listed among the errors and warnings.
     pub is_refused: bool,
 }

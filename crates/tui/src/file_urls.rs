@@ -1,10 +1,10 @@
-//! Addresses of files, for links.
+//! `file:` URLs for hyperlinks.
 
 use std::fmt::Write as _;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-/// The place that relative paths begin at, and the machine: a terminal may be on another one.
+/// The base of relative paths, and the host name, since the terminal may run on another machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct FileUrls {
     folder: PathBuf,
@@ -12,9 +12,9 @@ pub(super) struct FileUrls {
 }
 
 impl FileUrls {
-    /// The files of this process, on this machine.
+    /// URLs of files on this machine.
     pub(super) fn here() -> Self {
-        // Elsewhere than on Linux, no name stands for the machine that the terminal is on.
+        // Linux only: elsewhere the host name is left out.
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         Self { folder: std::env::current_dir().unwrap_or_default(), host: host.trim().to_owned() }
     }
@@ -27,7 +27,7 @@ impl FileUrls {
     }
 }
 
-/// Bytes as they may stand in an address (RFC 3986): all but letters, digits, `-._~` and the slash by their codes.
+/// Percent-encodes everything but unreserved characters and slashes (RFC 3986).
 fn quoted(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len());
     for byte in bytes {
@@ -49,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn paths_become_addresses() {
+    fn paths_become_file_urls() {
         let files = FileUrls { folder: "/home/ä".into(), host: "box".to_owned() };
         assert_eq!(files.address(Path::new("a b;%.png")), "file://box/home/%C3%A4/a%20b%3B%25.png");
         assert_eq!(files.address(Path::new("/tmp/x.png")), "file://box/tmp/x.png");

@@ -51,7 +51,7 @@ pub(super) fn state_with(
         is_light: false,
         ansi: XTERM,
         ask: TerminalQueries::default(),
-        abilities: Capabilities::default(),
+        capabilities: Capabilities::default(),
         notify_after: Some(Duration::from_secs(30)),
     };
     State::new(setup, Instant::now())

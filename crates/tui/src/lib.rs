@@ -1,8 +1,8 @@
-//! The terminal front end: messages and a picture in, requests and cells out.
+//! The terminal front end.
 //!
-//! An event comes in, `update` turns state and event into effects, `view` draws the state; one loop in
-//! [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless something
-//! changed. The help and the bottom line are made from the one table in `keymap`.
+//! Events go in; `update` turns state and event into effects and `view` draws the state. The event loop in
+//! [`run`](fn@run) owns the terminal and is the only place with side effects. Nothing is drawn unless
+//! something changed. The help and the line of keys are generated from the tables in `keymap`.
 
 mod action;
 mod camera;

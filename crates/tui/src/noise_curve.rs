@@ -1,16 +1,16 @@
-//! Noise against the time of a render.
+//! Noise over render time.
 
-/// Points that are kept; with more, every second one goes.
+/// Maximum number of points; when it is exceeded, every second point is dropped.
 const MOST: usize = 256;
-/// Least ratio of the times of two points: the axis of time is logarithmic.
+/// Minimum ratio between the times of two points, since the time axis is logarithmic.
 const STEP: f64 = 1.02;
 
-/// Seconds of a render, and the noise that was measured after them, in the order of time.
+/// Render times in seconds with the noise measured at each, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NoiseCurve(Vec<(f64, f64)>);
 
 impl NoiseCurve {
-    /// Notes the noise after so many seconds.
+    /// Records the noise after `seconds`.
     pub(super) fn note(&mut self, seconds: f64, noise: f64) {
         let is_later = self.0.last().is_none_or(|(last, _)| seconds > last * STEP);
         if !(seconds > 0.0 && seconds.is_finite() && noise > 0.0 && noise.is_finite() && is_later) {
@@ -26,7 +26,7 @@ impl NoiseCurve {
         }
     }
 
-    /// The last noise, which was measured when the render was over.
+    /// Records the final noise, measured at the end of the render.
     pub(super) fn end(&mut self, seconds: f64, noise: f64) {
         self.0.retain(|(time, _)| time * STEP < seconds);
         self.note(seconds, noise);
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_can_be_drawn_is_kept_and_the_end_is_what_was_measured() {
+    fn curve_is_bounded_and_ends_at_the_result() {
         let mut curve = NoiseCurve::default();
         for (seconds, noise) in
             [(0.0, 0.1), (0.5, f64::NAN), (0.5, 0.1), (0.505, 0.09), (1.0, 0.0), (2.0, 0.05)]

@@ -36,27 +36,28 @@ choice! {
     }
 }
 
-/// Everything that the front end needs.
+/// Inputs of the front end.
 pub struct Options {
     /// The scene file.
     pub scene: PathBuf,
-    /// Overrides of the command line; the keys change more on top.
+    /// Overrides from the command line; keys can change more.
     pub overrides: Overrides,
     /// Choice of colors.
     pub color: ColorChoice,
     /// Choice of how the preview is drawn.
     pub preview: PreviewChoice,
-    /// Height of a cell over its width. `None` to ask the terminal; if it does not answer, 2.
+    /// Height of a cell divided by its width. `None` to ask the terminal, with 2 as the fallback.
     pub cell_aspect: Option<f32>,
-    /// Time after which the end of a render is worth a notification, if the terminal has lost the focus. `None` for none.
+    /// Minimum duration of a render whose end is reported by a notification if the terminal does not have the
+    /// focus. `None` to disable notifications.
     pub notify_after: Option<Duration>,
-    /// Sends orders to the worker. Must not block.
+    /// Sends commands to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
-    /// Events of the worker. Their end means that the worker is gone, which ends the front end.
+    /// Events from the worker. The front end ends with an error when the channel closes.
     pub events: Receiver<Event>,
-    /// Slot of the worker's preview pictures.
+    /// Slot of the worker's previews.
     pub previews: PreviewSlot,
-    /// News from the watcher. A message reports their end.
+    /// Events from the file watcher. A message reports when the channel closes.
     pub news: Receiver<News>,
 }
 
@@ -65,7 +66,7 @@ pub struct Options {
 pub struct ExitStatus(pub u8);
 
 impl ExitStatus {
-    /// The person asked for it.
+    /// The user quit.
     pub const QUIT: Self = Self(0);
     /// SIGHUP: the terminal is gone.
     pub const HANGUP: Self = Self(129);
@@ -76,7 +77,7 @@ impl ExitStatus {
     /// SIGTERM.
     pub const TERMINATED: Self = Self(143);
 
-    /// A signal of this number.
+    /// Terminated by the signal of this number.
     pub fn signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }
@@ -87,19 +88,19 @@ impl ExitStatus {
 pub struct TuiOutcome {
     /// Exit code of the program.
     pub status: ExitStatus,
-    /// Whether a person ordered an image and does not know the outcome yet.
+    /// Whether the user requested an image whose outcome is not known yet.
     pub is_write_unanswered: bool,
-    /// The files written, with their samples and seconds, in one line.
+    /// The written files with their samples and render times, in one line.
     pub summary: String,
     /// Whether a file was written.
     pub has_written: bool,
-    /// Whether the last picture that was to be written is not on disk.
+    /// Whether the last image that should have been written is not on disk.
     pub is_unwritten: bool,
-    /// Changes by keys that are neither in the scene nor in an image, as options of the next call.
+    /// Changes made with keys that are neither in the scene nor in an image, as command-line options.
     pub not_kept: Option<String>,
 }
 
-/// Why the front end could not go on.
+/// Why the front end failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TuiError {
     /// Standard input or output is a file or a pipe.
@@ -116,7 +117,7 @@ pub enum TuiError {
         /// Why not.
         source: std::io::Error,
     },
-    /// The worker ended by itself.
+    /// The worker ended unexpectedly.
     #[error("the renderer stopped{}", .reason.as_ref().map(|text| format!(": {text}")).unwrap_or_default())]
     WorkerGone {
         /// The message of its panic, if there was one.

@@ -1,36 +1,37 @@
-//! Whether the terminal shows images by the protocol that `--preview` names: it is asked, and half blocks are drawn until it says so.
+//! Detects whether the terminal supports the image protocol chosen with `--preview`. Half blocks are drawn
+//! until it does.
 
 use std::time::{Duration, Instant};
 
 use super::graphics::{Protocol, wrapped};
 use super::terminals::TerminalId;
 
-/// Number of the image in the question about kitty's protocol.
+/// Image ID in the query for kitty's protocol.
 pub(super) const QUERY_ID: u32 = 4211;
-/// An image of one pixel that kitty's protocol does not keep; the terminal says whether it could be shown.
+/// Query for kitty's protocol: a one-pixel image that is not stored.
 pub(super) const KITTY_QUERY: &[u8] = b"\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
-/// The question for the terminal's name and version (XTVERSION).
+/// Query for the terminal's name and version (XTVERSION).
 const NAME_QUERY: &[u8] = b"\x1b[>q";
-/// Time for an answer, after which the user is told.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// Time after which a missing reply is reported to the user.
+const REPLY_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// The way to the terminal, as far as it concerns images.
+/// The path from glimt to the terminal, as it concerns images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ImageRoute {
-    /// None in between.
+    /// Nothing in between.
     Direct,
-    /// tmux, which passes on what is wrapped if `allow-passthrough` is on.
+    /// tmux, which passes on wrapped sequences if `allow-passthrough` is on.
     Tmux,
-    /// screen, or a console that prints sequences that it does not know: nothing is asked.
+    /// screen, or a console that prints unknown sequences: no queries are sent.
     Closed,
 }
 
-/// Pixels that were requested and are not confirmed yet.
+/// A request for pixels that is not confirmed yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PixelRequest {
     pub(super) protocol: Protocol,
-    pub(super) passage: ImageRoute,
-    /// Whether the environment names a terminal that has the protocol.
+    pub(super) route: ImageRoute,
+    /// Whether the environment names a terminal that supports the protocol.
     pub(super) is_known: bool,
 }
 
@@ -38,42 +39,43 @@ impl PixelRequest {
     pub(super) fn new(protocol: Protocol, variable: impl Fn(&str) -> Option<String>, is_plain: bool) -> Self {
         let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
         let term = variable("TERM").unwrap_or_default();
-        let passage = match () {
+        let route = match () {
             () if is_set("TMUX") => ImageRoute::Tmux,
             () if is_plain || is_set("STY") || term.starts_with("screen") => ImageRoute::Closed,
             () => ImageRoute::Direct,
         };
         let terminal = TerminalId::of_environment(variable);
         let has_iterm = terminal.is_some_and(|terminal| terminal.brand.has_iterm_images());
-        Self { protocol, passage, is_known: protocol == Protocol::Iterm && has_iterm }
+        Self { protocol, route, is_known: protocol == Protocol::Iterm && has_iterm }
     }
 
-    /// The question, if it is not among those that are asked anyway.
+    /// The query, unless it is sent anyway.
     pub(super) fn question(self) -> Vec<u8> {
-        match (self.protocol, self.passage) {
+        match (self.protocol, self.route) {
             (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
             (Protocol::Kitty, ImageRoute::Tmux) => wrapped(KITTY_QUERY),
             (Protocol::Iterm, ImageRoute::Tmux) => wrapped(NAME_QUERY),
             (Protocol::Iterm, ImageRoute::Direct) => NAME_QUERY.to_vec(),
-            // Device attributes are always asked for; tmux draws sixels itself.
+            // Device attributes are always queried, and tmux draws sixels itself.
             (Protocol::Sixel, _) | (_, ImageRoute::Closed) => Vec::new(),
         }
     }
 
-    /// Time at which the user is told that the terminal has not answered.
+    /// Time at which a missing reply is reported to the user.
     pub(super) fn deadline(self, now: Instant) -> Instant {
-        if self.passage == ImageRoute::Closed { now } else { now + PATIENCE }
+        if self.route == ImageRoute::Closed { now } else { now + REPLY_TIMEOUT }
     }
 
-    /// Whether an answer about device attributes comes after all others. tmux answers for these before what it passes on.
+    /// Whether the device attributes come after all other replies. tmux answers that query before it passes
+    /// on others.
     pub(super) fn ends_with_attributes(self) -> bool {
-        match (self.protocol, self.passage) {
+        match (self.protocol, self.route) {
             (Protocol::Sixel, _) | (_, ImageRoute::Direct) => true,
             (Protocol::Kitty | Protocol::Iterm, ImageRoute::Tmux | ImageRoute::Closed) => false,
         }
     }
 
-    /// Message about a terminal that does not have it, with the way to it.
+    /// Message that the terminal does not support the protocol, and what does.
     pub(super) fn refusal(self) -> String {
         let (name, terminals) = match self.protocol {
             Protocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
@@ -81,12 +83,12 @@ impl PixelRequest {
             Protocol::Iterm => ("iTerm2", "iTerm2, WezTerm or VS Code"),
         };
         let instead = "half blocks are shown instead";
-        match (self.protocol, self.passage) {
+        match (self.protocol, self.route) {
             (Protocol::Kitty | Protocol::Iterm, ImageRoute::Tmux) => format!(
                 "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux runs in {terminals}"
             ),
             (Protocol::Sixel, _) | (_, ImageRoute::Direct | ImageRoute::Closed) => {
-                format!("this terminal shows no {name} images: {instead}; use {terminals}")
+                format!("this terminal does not support {name} images: {instead}; use {terminals}")
             }
         }
     }
@@ -103,25 +105,25 @@ mod tests {
     }
 
     #[test]
-    fn the_environment_decides_how_to_ask() {
+    fn environment_decides_how_to_query() {
         let xterm = ("TERM", "xterm-256color");
         let direct = request(Protocol::Kitty, &[xterm], false);
-        assert_eq!((direct.passage, direct.question()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
+        assert_eq!((direct.route, direct.question()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
         let tmux = request(Protocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
-        assert_eq!(tmux.passage, ImageRoute::Tmux);
+        assert_eq!(tmux.route, ImageRoute::Tmux);
         assert!(tmux.question().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
         let screen = request(Protocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
-        assert_eq!((screen.passage, screen.question()), (ImageRoute::Closed, Vec::new()));
-        assert_eq!(request(Protocol::Iterm, &[xterm], true).passage, ImageRoute::Closed);
+        assert_eq!((screen.route, screen.question()), (ImageRoute::Closed, Vec::new()));
+        assert_eq!(request(Protocol::Iterm, &[xterm], true).route, ImageRoute::Closed);
         assert!(request(Protocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         assert!(!request(Protocol::Iterm, &[xterm], false).is_known);
         assert!(!request(Protocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         let number = String::from_utf8_lossy(KITTY_QUERY).contains(&format!("i={QUERY_ID},"));
-        assert!(number, "the answer is recognized by the number of the question");
+        assert!(number, "the reply repeats the ID of the query");
     }
 
     #[test]
-    fn tmux_answers_for_itself_too_early() {
+    fn tmux_answers_attribute_queries_itself() {
         for protocol in [Protocol::Kitty, Protocol::Iterm] {
             let tmux = request(protocol, &[("TMUX", "/tmp/tmux,1,0")], false);
             assert!(!tmux.ends_with_attributes());

@@ -1,6 +1,6 @@
-//! Decisions which previews are drawn, when, and how exactly.
+//! Decides which previews are drawn, when, and with which precision.
 //!
-//! The time comes with each call, so that a test can choose it.
+//! Each call is passed the current time, so tests can choose it.
 
 use std::path::PathBuf;
 use std::sync::{Arc, PoisonError};
@@ -21,38 +21,38 @@ use super::window_title::WindowTitle;
 use crate::film::Picture;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
 
-/// At most 20 frames a second, keys aside.
+/// Frame interval: at most 20 frames per second, except after keys.
 const FRAME: Duration = Duration::from_millis(50);
 
-/// Leads the terminal to the state.
+/// Draws the state on the terminal.
 pub(super) struct Presenter {
     pub(super) display: Display,
     drawn: DrawnPreview,
     previews: PreviewSlot,
-    /// Addresses of written files.
+    /// URLs of written files.
     files: FileUrls,
-    /// No frame before this.
+    /// Time of the next frame, unless it is urgent.
     next_frame: Instant,
-    /// The newest request of which a picture was drawn.
+    /// The newest request with a drawn preview.
     newest: u64,
 }
 
-/// The picture that was drawn last.
+/// The preview drawn last.
 #[derive(Default)]
 struct DrawnPreview {
     picture: Option<Arc<Picture>>,
     generation: u64,
-    /// Samples of a pixel, in the mean.
+    /// Mean samples per pixel.
     samples: f64,
-    /// When it was aimed at.
+    /// Time at which it became the target.
     at: Option<Instant>,
-    /// Whether the slot holds a newer preview of the same request, put off as it was not worth its bytes.
+    /// Whether the slot holds a newer preview of the same request that was not yet worth its bytes.
     is_old: bool,
-    /// Whether it is the first one of its request.
+    /// Whether it is the first preview of its request.
     is_first: bool,
-    /// Whether anything of it may have been sent.
+    /// Whether any of its bytes may have been sent.
     is_shown: bool,
-    /// Whether what the line had left is used to draw it exactly.
+    /// Whether idle bandwidth is used to draw it exactly.
     is_refined: bool,
 }
 
@@ -68,8 +68,8 @@ impl Presenter {
         }
     }
 
-    /// Takes note of a newer picture and gives it if it is to be drawn. Until it is worth its bytes it stays in the slot,
-    /// where a still newer one takes its place: the line carries whole pictures, and never a queue of them.
+    /// Handles a new preview in the slot, and takes it if it should be drawn. Otherwise it stays in the slot
+    /// and a newer one may replace it, so previews never queue up.
     pub(super) fn preview(&mut self, generation: u64, state: &State, now: Instant) -> Option<Event> {
         let is_same_request = generation == self.drawn.generation && !self.is_other(state);
         if is_same_request && self.advice(state, now) == PacingAdvice::Wait {
@@ -79,8 +79,7 @@ impl Presenter {
         self.take_preview()
     }
 
-    /// Whether the newest picture has another size than the one that is drawn, is of another part, or has the photons that
-    /// that one lacks.
+    /// Whether the newest preview differs from the drawn one in size, section, or the presence of photons.
     fn is_other(&self, state: &State) -> bool {
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner);
         let what = |picture: &Picture| (picture.width, picture.height);
@@ -90,7 +89,7 @@ impl Presenter {
         })
     }
 
-    /// Says what to do with a picture of the same request as the one that is drawn.
+    /// What to do with a newer preview of the drawn request.
     fn advice(&self, state: &State, now: Instant) -> PacingAdvice {
         advise(&self.moment(state, now))
     }
@@ -98,8 +97,8 @@ impl Presenter {
     fn moment(&self, state: &State, now: Instant) -> FrameTiming {
         let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
-        let is_quick = self.display.is_quick();
-        let is_shown = if is_quick { self.display.is_answered() } else { self.display.is_complete() };
+        let is_fast = self.display.is_fast();
+        let is_shown = if is_fast { self.display.is_answered() } else { self.display.is_complete() };
         FrameTiming {
             bytes_per_second: self.display.bytes_per_second(),
             cells: picture.map_or(0, |picture| self.cells(state, picture)),
@@ -107,7 +106,7 @@ impl Presenter {
             aimed_samples: picture.map(|_| self.drawn.samples),
             since_aim: self.drawn.at.map_or(Duration::MAX, |at| now.saturating_duration_since(at)),
             is_shown,
-            is_quick,
+            is_fast,
             is_in_pixels: self.display.draws_pixels(),
             is_final: is_still(state),
             final_in: progress
@@ -116,7 +115,7 @@ impl Presenter {
         }
     }
 
-    /// Number of cells of a preview; of pixels, the number of cells that cost as many bytes.
+    /// Number of cells of a preview, or the equivalent number for a preview in pixels.
     fn cells(&self, state: &State, picture: &Picture) -> u32 {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
@@ -133,13 +132,13 @@ impl Presenter {
         Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
     }
 
-    /// Looks again after a frame's time: somebody else has the screen.
+    /// Delays the next frame, because another program uses the screen.
     pub(super) fn postpone(&mut self, state: &mut State, now: Instant) {
         state.urgent = false;
         self.next_frame = now + FRAME;
     }
 
-    /// Aims the screen at the state as it is now.
+    /// Updates the target of the display if a frame is due.
     pub(super) fn draw_if_due(&mut self, state: &mut State, now: Instant) {
         let is_due = state.dirty && (state.urgent || now >= self.next_frame);
         let is_refined = self.has_room_to_refine(state);
@@ -153,33 +152,33 @@ impl Presenter {
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
-        if let Some(chrome) = WindowTitle::of(state, self.display.bytes_per_second().is_some()) {
-            self.display.dress(chrome);
+        if let Some(title) = WindowTitle::of(state, self.display.bytes_per_second().is_some()) {
+            self.display.dress(title);
         }
         let is_new = self.note_picture(state, now);
-        // The first preview stops being the first once all of it is on the screen, or once a newer one is noted.
+        // The first preview stays the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::of(state).preview;
         self.display.place(view::preview::placement(state, area), is_still(state));
-        let besides = self.besides(state, drawn);
-        self.display.aim(&buffer, area, self.fidelity(state), (is_new, &besides));
+        let extras = self.extras(state, drawn);
+        self.display.aim(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
 
-    /// Links, if the terminal has them, and what waits for the picture.
-    fn besides(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
-        let files = drawn.files.into_iter().filter(|_| state.display.abilities.links);
+    /// Hyperlinks, if the terminal supports them, and text to draw after the preview.
+    fn extras(&self, state: &State, drawn: ViewExtras) -> FrameExtras {
+        let files = drawn.files.into_iter().filter(|_| state.display.capabilities.links);
         let link = |(cells, path): (Rect, PathBuf)| Hyperlink { cells, address: self.files.address(&path) };
         FrameExtras { later: drawn.later, links: files.map(link).collect() }
     }
 
-    /// Whether the line is idle between two previews while a key moves the camera: the last one is on the screen, as exactly as a
-    /// moving one has to be, and the next one has not come.
+    /// Whether the connection is idle while a key moves the camera: the last preview is on the screen with
+    /// the precision of a moving one, and the next one has not arrived.
     fn has_room_to_refine(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
     }
 
-    /// Keeps which picture is drawn; whether it is another one than before.
+    /// Records the preview being drawn. Returns whether it is a new one.
     fn note_picture(&mut self, state: &State, now: Instant) -> bool {
         let Some(shown) = &state.picture.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
@@ -201,12 +200,13 @@ impl Presenter {
             () if is_still(state) => Fidelity::Still,
             () if self.drawn.is_refined => Fidelity::Following,
             () if self.drawn.is_first => Fidelity::First,
-            () if self.display.is_quick() => Fidelity::Following,
+            () if self.display.is_fast() => Fidelity::Following,
             () => Fidelity::Moving,
         }
     }
 
-    /// Sends what the line has room for, and stops early once `is_late`. Returns the events that follow for the state.
+    /// Sends as much as the connection allows, but stops once `is_late` returns true. Returns events for the
+    /// state.
     pub(super) fn pump(&mut self, state: &State, now: Instant, is_late: impl Fn() -> bool) -> Vec<Event> {
         let has_sent = self.display.pump(now, is_late);
         let mut events: Vec<Event> = self.display.take_report().map(Event::Frame).into_iter().collect();
@@ -220,7 +220,7 @@ impl Presenter {
         events
     }
 
-    /// When to look again if nothing happens; `None`: not before something does.
+    /// Time of the next action if no event arrives. `None` if there is none.
     pub(super) fn wake(&mut self, state: &State, now: Instant) -> Option<Instant> {
         let due = self.drawn.at.filter(|_| self.drawn.is_old).and_then(|at| self.moment(state, now).due(at));
         let refine = self.has_room_to_refine(state).then_some(now);
@@ -229,17 +229,17 @@ impl Presenter {
     }
 }
 
-/// Samples that a pixel has by now, in the mean.
+/// Mean samples per pixel so far.
 fn samples(state: &State) -> f64 {
     state.work.progress.as_ref().map_or(0.0, |progress| progress.fraction * f64::from(progress.total_samples))
 }
 
-/// Whether the newest picture stays as it is.
+/// Whether the newest preview is final.
 fn is_still(state: &State) -> bool {
     state.work.paused || !state.work.is_running() && view::status_line::goes_on(state).is_none()
 }
 
-/// When the state is to be drawn or told of the time.
+/// Time at which the state needs a frame or a tick.
 fn next_wake(state: &State, next_frame: Instant) -> Option<Instant> {
     let frame = state.dirty.then_some(if state.urgent { state.now } else { next_frame });
     [frame, state.next_tick()].into_iter().flatten().min()
@@ -251,13 +251,13 @@ mod tests {
     use crate::fixtures::state;
 
     #[test]
-    fn an_idle_state_is_not_woken() {
+    fn idle_state_is_not_woken() {
         let now = Instant::now();
         let mut state = state(80, 24);
         state.dirty = true;
         assert_eq!(next_wake(&state, now), Some(now));
         state.dirty = false;
-        assert!(next_wake(&state, now).is_some(), "the clock of a render runs");
+        assert!(next_wake(&state, now).is_some(), "the elapsed time changes");
         state.work.activity = crate::state::Activity::Done;
         assert_eq!(next_wake(&state, now), None);
     }

@@ -1,4 +1,4 @@
-//! Kinds of previews, by the person's choice and by the terminal's abilities.
+//! Kinds of previews, depending on the user's choice and the terminal.
 
 use super::color::ColorDepth;
 use super::graphics::Protocol;
@@ -6,7 +6,7 @@ use super::mosaic::Grid;
 use super::options::PreviewChoice;
 use super::pixel_request::PixelRequest;
 
-/// Kinds of previews.
+/// How the preview is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PreviewKind {
     HalfBlock,
@@ -14,17 +14,17 @@ pub(super) enum PreviewKind {
     Sextant,
     Octant,
     Ascii,
-    /// In pixels; in half blocks where words lie over it.
+    /// Pixels, or half blocks while text covers it.
     Pixels(Protocol),
     None,
 }
 
 impl PreviewKind {
-    /// The kind for a choice on a terminal of this depth.
+    /// The kind for a choice and color depth.
     pub(super) fn of(choice: PreviewChoice, depth: ColorDepth) -> Self {
         match choice {
             PreviewChoice::None => Self::None,
-            // Without colors half blocks are a uniform wall.
+            // Half blocks need colors.
             PreviewChoice::Ascii => Self::Ascii,
             PreviewChoice::Kitty => Self::Pixels(Protocol::Kitty),
             PreviewChoice::Sixel => Self::Pixels(Protocol::Sixel),
@@ -37,7 +37,7 @@ impl PreviewKind {
         }
     }
 
-    /// The kind to begin with: pixels only if the terminal is known to have them.
+    /// The kind to start with: pixels only if support is known.
     pub(super) fn at_first(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
         match (Self::of(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {
@@ -47,7 +47,7 @@ impl PreviewKind {
         }
     }
 
-    /// The grid of a cell. `None` if cells have no parts, or if there are no cells.
+    /// The grid of parts of a cell. `None` if cells have no parts.
     pub(super) fn grid(self) -> Option<Grid> {
         match self {
             Self::HalfBlock => Some(Grid::Halves),
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_colors_the_preview_is_a_ramp() {
+    fn preview_without_colors_is_a_ramp() {
         assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(PreviewKind::of(PreviewChoice::HalfBlock, ColorDepth::None), PreviewKind::Ascii);
         assert_eq!(PreviewKind::of(PreviewChoice::Auto, ColorDepth::Ansi16), PreviewKind::HalfBlock);

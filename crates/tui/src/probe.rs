@@ -1,4 +1,4 @@
-//! Questions to the terminal outside of the front end, for a report on what it is.
+//! Queries the terminal outside of the front end, for a report on its capabilities.
 
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
@@ -9,53 +9,53 @@ use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
-use super::environment::{is_plain, way};
+use super::environment::{is_plain, terminal_link};
 use super::input::{DecodedInput, Decoder};
 use super::pixel_request::KITTY_QUERY;
 use super::terminal;
 use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
 use super::terminals::{Brand, TerminalId};
 
-/// Answers of a terminal, and what its environment says.
+/// Replies of the terminal, and what the environment says about it.
 #[derive(Clone, Debug)]
 pub struct Probe {
-    /// Columns and rows of cells.
+    /// Columns and rows.
     pub cells: (u16, u16),
-    /// Width and height of a cell in pixels, as far as the terminal says.
+    /// Size of a cell in pixels, if the terminal reports it.
     pub cell_pixels: (u16, u16),
-    /// Colors by the environment.
+    /// Color depth according to the environment.
     pub depth: ColorDepth,
-    /// Whether tmux or screen lies between.
+    /// Runs inside tmux or screen.
     pub is_multiplexed: bool,
-    /// Whether the shell came over a network.
+    /// Runs over a network connection.
     pub is_remote: bool,
-    /// Whether it shows images by iTerm2's protocol, by its name in the environment.
+    /// Whether the environment names a terminal with iTerm2's inline images.
     pub has_iterm: bool,
-    /// The terminal's answers. `None` if it gives none.
+    /// Replies of the terminal. `None` if it does not reply.
     pub answers: Option<ProbeReplies>,
 }
 
-/// Answers of a terminal.
+/// Replies of the terminal.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProbeReplies {
-    /// Time from a status report's request to its answer.
+    /// Round-trip time of a status report.
     pub round_trip: Duration,
     /// Name and version (XTVERSION).
     pub name: Option<String>,
-    /// Whether it has 24 bits of color (XTGETTCAP).
+    /// Support for 24-bit color (XTGETTCAP).
     pub has_true_color: bool,
-    /// Whether it shows images by kitty's protocol.
+    /// Support for kitty's graphics protocol.
     pub has_kitty: bool,
-    /// Whether it shows sixels (DA1).
+    /// Support for sixels (DA1).
     pub has_sixel: bool,
-    /// Whether large changes appear at once (DECRQM 2026).
+    /// Support for synchronized output (DECRQM 2026).
     pub is_synchronized: bool,
-    /// Background in sRGB (OSC 11).
+    /// Background color in sRGB (OSC 11).
     pub background: Option<[u8; 3]>,
 }
 
 impl Probe {
-    /// The parts of a cell that a preview without a choice draws, in words.
+    /// Name of the characters that an automatic preview is drawn with.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
         let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::of_report);
@@ -68,19 +68,19 @@ impl Probe {
     }
 }
 
-/// Time to wait for answers.
+/// Timeout of the replies.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Asks the terminal. `None` if stdin and stdout are not one.
+/// Queries the terminal. `None` if stdin or stdout is not a terminal.
 ///
-/// It asks multiplexers and consoles for their attributes alone, as they may print other questions.
+/// Multiplexers and consoles are only asked for device attributes because they may print other queries.
 pub fn probe() -> Option<Probe> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;
     }
     let variable = |name: &str| std::env::var(name).ok();
-    let (window, way) = (terminal::window(None), way(variable));
-    let questions = if is_plain(variable) || way.is_multiplexed {
+    let (window, link) = (terminal::window(None), terminal_link(variable));
+    let questions = if is_plain(variable) || link.is_multiplexed {
         Vec::new()
     } else {
         let ask = TerminalQueries {
@@ -100,14 +100,14 @@ pub fn probe() -> Option<Probe> {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
         depth: color::depth(ColorChoice::Auto, variable),
-        is_multiplexed: way.is_multiplexed,
-        is_remote: way.is_remote,
+        is_multiplexed: link.is_multiplexed,
+        is_remote: link.is_remote,
         has_iterm: brand.is_some_and(Brand::has_iterm_images),
         answers,
     })
 }
 
-/// Sends questions in raw mode, and gives the modes back.
+/// Sends the queries in raw mode, then restores the previous modes.
 fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let stdin = io::stdin();
     let before = tcgetattr(&stdin)?;
@@ -115,7 +115,7 @@ fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     cfmakeraw(&mut raw);
     tcsetattr(&stdin, SetArg::TCSANOW, &raw)?;
     let answers = converse(questions);
-    // What comes late is not for the shell.
+    // Late replies must not reach the shell.
     let _ = nix::sys::termios::tcflush(&stdin, FlushArg::TCIFLUSH);
     tcsetattr(&stdin, SetArg::TCSANOW, &before)?;
     answers
@@ -139,7 +139,7 @@ fn send(bytes: &[u8]) -> io::Result<()> {
     stdout.flush()
 }
 
-/// Reads until all is heard, or it takes too long; whether it is.
+/// Reads replies until `is_all` holds. Returns false on timeout.
 fn listen(
     heard: &mut ReceivedReplies,
     begin: Instant,
@@ -162,12 +162,12 @@ fn listen(
     Ok(true)
 }
 
-/// Bytes from the terminal, and the answers in them.
+/// Bytes received from the terminal, and the replies found in them.
 #[derive(Default)]
 struct ReceivedReplies {
     decoder: Decoder,
     answers: Vec<TerminalReply>,
-    /// All of it, for what the front end does not ask for.
+    /// All bytes, for replies that the front end does not use.
     bytes: Vec<u8>,
 }
 
@@ -185,7 +185,7 @@ impl ReceivedReplies {
         self.answers.contains(&answer)
     }
 
-    /// The answers among all that was heard.
+    /// Summarizes the received replies.
     fn answers(&self) -> ProbeReplies {
         let background = |answer: &TerminalReply| match answer {
             TerminalReply::Background(rgb) => Some(*rgb),
@@ -211,7 +211,7 @@ impl ReceivedReplies {
         }
     }
 
-    /// The first text between a beginning and the end byte, without another escape character in it.
+    /// The first text between `begin` and `end` without an escape character.
     fn between(&self, begin: &[u8], end: u8) -> Option<String> {
         let starts = self.bytes.windows(begin.len()).enumerate().filter(|(_, window)| *window == begin);
         starts.into_iter().find_map(|(at, _)| {
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_are_found_in_any_order() {
+    fn replies_are_found_in_any_order() {
         let heard = heard(
             b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c",
         );
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals_are_no_abilities() {
+    fn refusals_are_not_capabilities() {
         let refused = heard(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
         assert_eq!(refused.answers(), ProbeReplies::default());
         assert!(!heard(b"\x1b[?62;").has(TerminalReply::Attributes));

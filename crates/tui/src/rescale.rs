@@ -1,4 +1,4 @@
-//! Pictures at another size.
+//! Image resizing.
 
 use std::borrow::Cow;
 
@@ -6,13 +6,13 @@ use crate::film::Picture;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
-/// The picture at another size.
+/// The image resized to `width` × `height`.
 pub(super) fn resized(picture: &Picture, width: u32, height: u32) -> Picture {
     Picture { width, height, pixels: rescaled(picture, width, height).into_owned() }
 }
 
-/// The picture at another size: means over the pixels covered, in linear light, weighted by how much of each is
-/// covered; where it grows, the pixel at the middle.
+/// The pixels of the resized image. Shrinking averages the covered pixels in linear light, weighted by area;
+/// enlarging repeats the nearest pixel.
 pub(super) fn rescaled(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[u8; 3]]> {
     if (picture.width, picture.height) == (width, height) {
         return Cow::Borrowed(&picture.pixels);
@@ -28,7 +28,7 @@ pub(super) fn rescaled(picture: &Picture, width: u32, height: u32) -> Cow<'_, [[
     Cow::Owned(pixels)
 }
 
-/// The source pixels under one target pixel along one axis, with the length of each that is covered.
+/// The source pixels that a target pixel covers along one axis, with the covered lengths.
 fn covered(target: u32, targets: u32, sources: u32) -> Vec<(u32, f32)> {
     if targets >= sources {
         let middle = (u64::from(target) * 2 + 1) * u64::from(sources) / (2 * u64::from(targets.max(1)));
@@ -74,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn shrinking_takes_the_mean_in_linear_light() {
+    fn shrinking_averages_in_linear_light() {
         let checks = picture(8, 8, |x, y| if (x + y) % 2 == 0 { [255; 3] } else { [0; 3] });
         let half = linear_to_srgb8(0.5);
         assert_eq!(rescaled(&checks, 4, 4).as_ref(), [[half; 3]; 16]);
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn growing_repeats_pixels() {
+    fn enlarging_repeats_pixels() {
         let two = picture(2, 1, |x, _| if x == 0 { [1, 2, 3] } else { [4, 5, 6] });
         assert_eq!(rescaled(&two, 4, 1).as_ref(), [[1, 2, 3], [1, 2, 3], [4, 5, 6], [4, 5, 6]]);
     }

@@ -1,4 +1,4 @@
-//! The loop: the one owner of the terminal and the one place where effects happen.
+//! The event loop: sole owner of the terminal, and the only place with side effects.
 
 use std::collections::VecDeque;
 use std::io;
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use super::color::{self, ColorDepth};
 use super::display::{Display, TerminalLink};
 use super::editor;
-use super::environment::{ask, way};
+use super::environment::{ask, terminal_link};
 use super::event::FilePosition;
 use super::event::{Effect, Event, EventSource};
 use super::exit_summary;
@@ -25,39 +25,40 @@ use super::update::{start, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
 
-/// The longest that a slice is planned before it is sent and before keys are looked for.
+/// Maximum time to plan a slice before it is sent and keys are handled.
 const TURN: Duration = Duration::from_millis(3);
 
-/// Runs the front end until it is quit, by a key or a signal, and gives the terminal back. The worker is sent
-/// [`Command::Quit`] at the end. To be called once in a process.
+/// Runs the front end until a key or a signal ends it, then restores the terminal and sends [`Command::Quit`]
+/// to the worker. Must be called only once per process.
 ///
 /// # Errors
-/// [`TuiError`] if there is no terminal, if it cannot be written to, or if the worker is gone.
+/// [`TuiError`] if there is no terminal, if it cannot be written to, or if the worker has ended.
 pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     terminal::require()?;
     let depth = color::depth(options.color, |name| std::env::var(name).ok());
-    // Otherwise crossterm drops colors by name if NO_COLOR is set.
+    // Otherwise crossterm drops named colors when NO_COLOR is set.
     crossterm::style::force_color_output(depth != ColorDepth::None);
 
     let (sender, events) = mpsc::channel();
-    let listener = Listener::start(&sender).map_err(failed("hear signals for"))?;
+    let listener = Listener::start(&sender).map_err(failed("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
-    let abilities = TerminalId::of_environment(variable).map(TerminalId::abilities).unwrap_or_default();
-    if abilities.focus {
+    let capabilities = TerminalId::of_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
+    if capabilities.focus {
         terminal::will_report_focus();
     }
     let screen = TerminalSession::open()?;
-    let way = TerminalLink { ask: ask(options.preview, options.color, depth, variable), ..way(variable) };
+    let link =
+        TerminalLink { ask: ask(options.preview, options.color, depth, variable), ..terminal_link(variable) };
     let setup = Setup {
         scene: options.scene,
         overrides: options.overrides,
         window: terminal::window(options.cell_aspect),
-        preview: PreviewKind::at_first(options.preview, depth, way.ask.pixels),
+        preview: PreviewKind::at_first(options.preview, depth, link.ask.pixels),
         depth,
         is_light: color::has_light_background(variable),
         ansi: *color::ansi(&variable("TERM").unwrap_or_default()),
-        ask: way.ask,
-        abilities,
+        ask: link.ask,
+        capabilities,
         notify_after: options.notify_after,
     };
     forward("worker-events", options.events, &sender, Event::Worker, EventSource::Worker)?;
@@ -66,7 +67,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     writer::start(&sender).map_err(failed("write to"))?;
 
     let now = Instant::now();
-    let display = Display::new(depth, way, None, Box::new(writer::send), now);
+    let display = Display::new(depth, link, None, Box::new(writer::send), now);
     let ui = Ui {
         screen,
         presenter: Presenter::new(display, options.previews, now),
@@ -85,7 +86,7 @@ fn failed(action: &'static str) -> impl Fn(io::Error) -> TuiError {
     move |source| TuiError::Terminal { action, source }
 }
 
-/// Passes one channel on into the loop's, and says when it ends.
+/// Forwards a channel to the event loop and reports its end.
 fn forward<T: Send + 'static>(
     name: &str,
     from: Receiver<T>,
@@ -110,14 +111,14 @@ struct Ui {
     screen: TerminalSession,
     presenter: Presenter,
     events: Receiver<Event>,
-    /// Events that came while the loop waited for answers.
+    /// Events that arrived while the loop waited for replies.
     postponed: VecDeque<Event>,
     state: State,
     commands: Box<dyn FnMut(Command)>,
     cell_aspect: Option<f32>,
 }
 
-/// Ends of the loop.
+/// Reasons to leave the event loop.
 enum LoopEnd {
     Quit(ExitStatus),
     Error(TuiError),
@@ -130,13 +131,13 @@ impl Ui {
         while end.is_none() {
             end = self.present().or_else(|| self.wait());
         }
-        // What the person did not end is gone on with later: a signal came, or the terminal is gone or broken.
+        // Unless the user quit, keep the checkpoint: a signal arrived, or the terminal is gone or broken.
         if !matches!(&end, Some(LoopEnd::Quit(ExitStatus::QUIT))) {
             (self.commands)(Command::Suspend);
         }
         (self.commands)(Command::Quit);
         let status = match end {
-            // Whoever sends SIGHUP by hand still has the terminal and wants it back.
+            // If SIGHUP was sent by hand, the terminal still exists and must be restored.
             Some(LoopEnd::Quit(ExitStatus::HANGUP)) => {
                 if !terminal::is_there() {
                     self.screen.abandon();
@@ -161,8 +162,7 @@ impl Ui {
         })
     }
 
-    /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for
-    /// something typed.
+    /// Leaves the screen and waits briefly for outstanding replies, which a shell would take for typed text.
     fn leave(&mut self) {
         self.screen.leave();
         let deadline = self.presenter.display.patience().map(|patience| Instant::now() + patience);
@@ -175,7 +175,7 @@ impl Ui {
         }
     }
 
-    /// Everything that has happened, or the next thing that does.
+    /// Waits for events and handles all that have arrived.
     fn wait(&mut self) -> Option<LoopEnd> {
         let now = Instant::now();
         let wake = self.presenter.wake(&self.state, now);
@@ -213,7 +213,8 @@ impl Ui {
             Event::Unwritable(kind) => return Some(unwritable(kind.into())),
             Event::Key(_) | Event::Mouse(_) => {
                 let end = self.apply(event);
-                // A step of the camera is drawn with its picture, which comes at once and has need of the processor.
+                // A camera step is drawn with its first preview, which arrives at once and needs the
+                // processor.
                 self.state.urgent |= self.state.dirty && !self.state.awaits_step();
                 return end;
             }
@@ -245,7 +246,7 @@ impl Ui {
             Effect::Suspend if signals::has_shell() => {
                 self.leave();
                 self.screen.suspend();
-                // Stopped here; SIGCONT then asks for a redraw.
+                // The process stops here; SIGCONT then requests a redraw.
                 signals::stop();
             }
             Effect::Suspend => {}
@@ -255,7 +256,7 @@ impl Ui {
             Effect::ReportFocus => self.screen.report_focus(),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
-                // It may have shrunk and grown again, and cut what was shown.
+                // The window may have shrunk and grown again, which cuts off its content.
                 self.presenter.display.forget();
                 return self.measure();
             }
@@ -263,12 +264,12 @@ impl Ui {
         None
     }
 
-    /// The terminal is the editor's until it ends.
+    /// Leaves the terminal to the editor until it exits.
     fn edit(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave();
         input::hold(true);
         self.screen.suspend();
-        // Until keys come raw again they send signals.
+        // While the terminal is not in raw mode, keys send signals.
         let keys_of_child = signals::leave_keys_to_child();
         terminal::lend();
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
@@ -291,7 +292,7 @@ impl Ui {
         self.apply(Event::Resize(terminal::window(self.cell_aspect)))
     }
 
-    /// Draws what is due, and sends what the line has room for.
+    /// Draws a frame if one is due, and sends as much as the connection allows.
     fn present(&mut self) -> Option<LoopEnd> {
         if !self.screen.is_taken() {
             self.presenter.postpone(&mut self.state, Instant::now());
@@ -304,7 +305,7 @@ impl Ui {
     }
 }
 
-/// A terminal that is gone is a hangup, whether its signal has come or not.
+/// Treats a vanished terminal as a hangup even if SIGHUP has not arrived.
 fn unwritable(error: io::Error) -> LoopEnd {
     if terminal::is_there() {
         LoopEnd::Error(TuiError::Terminal { action: "write to", source: error })

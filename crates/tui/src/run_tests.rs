@@ -1,9 +1,7 @@
-//! Tests of the loop's parts.
-
 use super::*;
 
 #[test]
-fn a_source_that_ends_is_reported_after_its_messages() {
+fn end_of_a_channel_is_reported_last() {
     let (from, receiver) = mpsc::channel();
     let (sender, events) = mpsc::channel();
     forward("test", receiver, &sender, Event::of_watcher, EventSource::Watcher).expect("a thread");

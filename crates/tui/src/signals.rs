@@ -1,7 +1,8 @@
-//! Signals, and a terminal that goes away without one.
+//! Signal handling, and detection of a terminal that disappears without a signal.
 //!
-//! They are heard on threads of their own, because the loop can be stuck: in a write to a terminal that takes
-//! nothing, or behind keys that never end. What has to end the program ends it from here when the loop does not.
+//! Signals are handled on separate threads because the event loop may be blocked by a terminal that accepts
+//! no output or by endless input. If the loop does not react to a terminating signal, the process is ended
+//! from here.
 
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,19 +26,19 @@ use super::ExitStatus;
 use super::event::{Event, Signal};
 use super::terminal;
 
-/// Time for the loop to end after a signal.
+/// Time for the event loop to end after a signal.
 const GRACE: Duration = Duration::from_millis(1500);
-/// Time for a stuck terminal to take the bytes that restore it.
+/// Time for a stalled terminal to accept the bytes that restore it.
 const RESCUE: Duration = Duration::from_millis(100);
-/// Interval between looks at the terminal.
+/// Poll interval for the existence of the terminal.
 const WATCH: Duration = Duration::from_millis(500);
 
-/// Signals that mean something to the front end.
+/// Signals that the event loop handles.
 const MEANT: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
-/// Signals that mean nothing to the front end and end a program all the same: it gives the terminal back before that.
+/// Other signals that terminate a program: the terminal is restored first.
 const OTHERS: [i32; 9] = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
 
-/// The same of Linux alone, real-time signals among them.
+/// The same for signals that only Linux has, including real-time signals.
 #[cfg(target_os = "linux")]
 fn of_linux() -> impl Iterator<Item = i32> {
     [libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
@@ -48,16 +49,16 @@ fn of_linux() -> impl Iterator<Item = i32> {
     std::iter::empty()
 }
 
-/// Only wakes the thread that hears: nobody else sends it, and it means nothing by default.
+/// A signal that only wakes the signal thread: no one else sends it, and it is ignored by default.
 const MARK: i32 = SIGURG;
 
-/// Hears signals until it is dropped; after that they have their default effects.
+/// Handles signals until it is dropped; then they have their default effects again.
 pub(super) struct Listener {
     over: Arc<AtomicBool>,
 }
 
 impl Listener {
-    /// Starts to listen; what is heard goes to `events`.
+    /// Starts the signal threads, which send to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
         let mut signals = Signals::new(MEANT.into_iter().chain(OTHERS).chain(of_linux()).chain([MARK]))?;
@@ -81,24 +82,24 @@ impl Drop for Listener {
     }
 }
 
-/// Whether the line has dropped: then the program ends within [`GRACE`], whatever else comes.
+/// Whether the terminal has hung up. The program then ends within [`GRACE`].
 static HUNG_UP: AtomicBool = AtomicBool::new(false);
 
-/// Whether signals that keys send are a child's.
+/// Whether a child process handles signals from the keyboard.
 static KEYS_OF_CHILD: AtomicBool = AtomicBool::new(false);
 
-/// Number of times that all pending signals were heard.
+/// Number of rounds in which all pending signals were handled.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
 
 fn rounds() -> MutexGuard<'static, u64> {
     ROUNDS.0.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Time to wait for a thread that hears. Hearing takes some microseconds; only a thread that is gone takes this long.
+/// Timeout for the signal thread. Handling takes microseconds, so it only expires if the thread is gone.
 const HEARING: Duration = Duration::from_secs(10);
 
-/// Returns when all signals that came before have been heard. The first round may have begun before that; the second one
-/// has not.
+/// Returns when all signals sent before have been handled. The first round may have started before the call,
+/// the second one has not.
 fn hear_what_came() {
     for _ in 0..2 {
         let before = rounds();
@@ -109,7 +110,7 @@ fn hear_what_came() {
     }
 }
 
-/// The program that has the terminal, and the signal that ends this one meanwhile.
+/// The foreground child process, and the signal that is ending this process.
 struct ForegroundChild {
     id: Option<Pid>,
     ending: Option<Number>,
@@ -121,7 +122,7 @@ fn child() -> MutexGuard<'static, ForegroundChild> {
     CHILD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Signals that end this program end its child as well, until there is none.
+/// Sets the child to which terminating signals are forwarded. `None` if it has exited.
 pub(super) fn set_child(id: Option<Pid>) {
     let mut child = child();
     child.id = id;
@@ -130,7 +131,8 @@ pub(super) fn set_child(id: Option<Pid>) {
     }
 }
 
-/// The same for a signal that comes now; once, because it may come back with the others of the job.
+/// Forwards a terminating signal to the child, but only once, since the signal may come back with the rest of
+/// the job.
 fn end_child(number: Number) {
     let mut child = child();
     if child.ending.replace(number).is_none()
@@ -140,25 +142,27 @@ fn end_child(number: Number) {
     }
 }
 
-/// To the child and, where the job is this program's own, to all in it: a shell does not pass it on to what it runs.
+/// Forwards to the child or, if this process leads the job, to the whole job, since a shell does not forward
+/// signals to its children.
 fn pass_on(id: Pid, number: Number) {
     let whole_job = Pid::from_raw(0);
-    // One that is gone needs no end.
+    // Ignore errors: the process may have exited.
     let _ = kill(if getpgrp() == getpid() { whole_job } else { id }, number);
 }
 
-/// Signals that keys send are a child's until the result is dropped.
+/// Leaves keyboard signals to the child until the result is dropped.
 pub(super) fn leave_keys_to_child() -> KeysOfChild {
     KEYS_OF_CHILD.store(true, Ordering::Release);
     KeysOfChild(())
 }
 
-/// See [`leave_keys_to_child`].
+/// Guard returned by [`leave_keys_to_child`].
 pub(super) struct KeysOfChild(());
 
 impl Drop for KeysOfChild {
     fn drop(&mut self) {
-        // A key that ended the child is heard here as well, and perhaps later.
+        // A key that ended the child also sent its signal to this process, which may not have been handled
+        // yet.
         hear_what_came();
         KEYS_OF_CHILD.store(false, Ordering::Release);
     }
@@ -175,8 +179,8 @@ impl SignalThread {
             return;
         }
         if self.over.load(Ordering::Acquire) {
-            // After the line has dropped, a hangup must not cut short the checkpoint under way: it may come after the loop has met
-            // the dropped line itself, or once more from the shell.
+            // After a hangup, a SIGHUP must not interrupt the final checkpoint. It may arrive after the loop
+            // has noticed the hangup itself, or a second time from the shell.
             if number == SIGHUP {
                 if HUNG_UP.load(Ordering::Acquire) {
                     return;
@@ -185,7 +189,7 @@ impl SignalThread {
                     return self.tell(Signal::Hangup);
                 }
             }
-            // Those of Linux alone are not known to it.
+            // Signals that only exist on Linux are not known to signal-hook.
             if low_level::emulate_default_handler(number).is_err() {
                 low_level::exit(128 + number);
             }
@@ -229,7 +233,7 @@ impl SignalThread {
             let over = Arc::clone(&self.over);
             thread::spawn(move || end_later(signal, status, &over));
         }
-        // The loop is gone: so is the need to tell it.
+        // Without a receiver, the event loop has ended and needs no signal.
         let _ = self.events.send(Event::Signal(signal));
     }
 }
@@ -247,7 +251,7 @@ fn number(signal: Signal) -> i32 {
     }
 }
 
-/// The exit code of a signal that ends the program.
+/// Exit code for a terminating signal.
 fn ends(signal: Signal) -> Option<ExitStatus> {
     match signal {
         Signal::Interrupt => Some(ExitStatus::INTERRUPTED),
@@ -259,8 +263,8 @@ fn ends(signal: Signal) -> Option<ExitStatus> {
     }
 }
 
-/// Ends the process when the loop did not. After a hangup nothing is waited for: there is nobody to see it. A child that
-/// goes on may have left the terminal in any mode.
+/// Ends the process if the event loop did not. After a hangup there is no terminal to restore. A running
+/// child may have left the terminal in any mode.
 fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE);
     if signal != Signal::Hangup {
@@ -274,8 +278,8 @@ fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     low_level::exit(i32::from(status.0));
 }
 
-/// Whether a stopped program could be continued: a shell of the same session is waiting. A session's first
-/// process (a terminal that runs glimt itself) has none.
+/// Whether a stopped process could be continued, that is, whether a shell runs in the same session. The first
+/// process of a session has none.
 pub(super) fn has_shell() -> bool {
     match (getsid(None), getsid(Some(getppid()))) {
         (Ok(own), Ok(parents)) => own == parents && own != getpid(),
@@ -283,14 +287,15 @@ pub(super) fn has_shell() -> bool {
     }
 }
 
-/// Stops the whole job with SIGTSTP, as ctrl-z does outside raw mode, so that a program around glimt stops too.
+/// Stops the whole job with SIGTSTP, as ctrl-z does outside raw mode, so that a wrapper around glimt stops
+/// too.
 pub(super) fn stop_job() -> io::Result<()> {
     kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)
 }
 
-/// Stops this process, as SIGTSTP would without a handler; returns when it is continued.
+/// Stops this process as SIGTSTP does by default. Returns when it is continued.
 pub(super) fn stop() {
-    // A process that cannot be stopped goes on, which is all that can be done.
+    // If the process cannot be stopped, it continues to run.
     let _ = low_level::emulate_default_handler(SIGTSTP);
 }
 
@@ -300,14 +305,14 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn real_time_signals_are_heard() {
+    fn real_time_signals_are_handled() {
         let heard: Vec<i32> = of_linux().collect();
         assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
         assert_eq!(ends(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }
 
     #[test]
-    fn the_signals_that_end_have_their_codes() {
+    fn terminating_signals_have_exit_codes() {
         assert_eq!(ends(Signal::Interrupt), Some(ExitStatus(130)));
         assert_eq!(ends(Signal::Terminate), Some(ExitStatus(143)));
         assert_eq!(ends(Signal::Quit), Some(ExitStatus(131)));

@@ -1,10 +1,10 @@
-//! Pictures among the lines of a terminal: without a screen of their own, and without questions to the terminal.
+//! Images printed as lines of text, without a full-screen UI and without terminal queries.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
 
-use super::color::{self, ColorChoice, ColorDepth, Shades};
+use super::color::{self, ColorChoice, ColorDepth, ColorMapper};
 use super::event::Window;
 use super::options::PreviewChoice;
 use super::paint::in_lines;
@@ -13,46 +13,47 @@ use super::view::preview::{PreviewColors, shown_by, size_in_cells};
 use super::view::text::{columns, shortened};
 use crate::film::Picture;
 
-/// A narrower terminal shows no pictures.
+/// Minimum width of a terminal that shows images.
 const LEAST_COLUMNS: u16 = 30;
-/// Pictures beside each other are not narrower.
+/// Minimum width of images that are side by side.
 const LEAST_BESIDE: u16 = 20;
-/// Columns between them.
+/// Columns between images.
 const GAP: u16 = 2;
-/// Rows of a terminal that are left for words.
+/// Rows of the terminal reserved for text.
 const WORDS: u16 = 17;
-/// Rows of a picture in a terminal that has fewer.
+/// Height of an image in a terminal with fewer rows.
 const LEAST_ROWS: u16 = 7;
 
-/// A picture, and what stands above it.
+/// An image and its caption.
 #[derive(Clone, Debug)]
 pub struct NamedImage {
-    /// Without control characters.
+    /// Must not contain control characters.
     pub name: String,
-    /// Pictures that are printed together have one size.
+    /// Images printed together have the same size.
     pub picture: Picture,
 }
 
-/// Lines that show pictures beside each other, or below each other in a narrow terminal, in the colors that it has; without colors,
-/// in characters. Nothing for a terminal of less than 30 columns. Where stdout is none: for one of 80 columns and 24 rows.
+/// Lines that show images side by side, or below each other in a narrow terminal. They use the terminal's
+/// colors, or characters if it has none. Empty if the terminal has fewer than 30 columns. Without a terminal,
+/// the size is 80×24.
 pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: bool) -> String {
     let variable = |name: &str| std::env::var(name).ok();
     let depth = color::depth(color, variable);
-    let shades = Shades::new(depth, color::ansi(&variable("TERM").unwrap_or_default()));
+    let shades = ColorMapper::new(depth, color::ansi(&variable("TERM").unwrap_or_default()));
     let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
     let (size, aspect) = if is_terminal { room(&terminal::window(None)) } else { ((80, 24), 2.0) };
     let buffers = laid_out(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| in_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
-/// Some terminals say that they have no cells.
+/// Window size and cell aspect; some terminals report a size of 0.
 fn room(window: &Window) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
     (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))
 }
 
-/// The pictures in one row or in several.
+/// The images in one or more rows of text cells.
 fn laid_out(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
@@ -71,7 +72,7 @@ fn laid_out(
     }
 }
 
-/// Pictures beside each other with their names above, each in so many columns and rows at most.
+/// Images side by side below their captions, each at most as large as `room`.
 fn row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspect: f32) -> Buffer {
     let sizes = pictures.iter().map(|one| size_in_cells(&one.picture, inks.depth, room, aspect));
     let (width, height) = sizes.fold((0, 0), |most, size| (most.0.max(size.0), most.1.max(size.1)));
@@ -94,7 +95,7 @@ mod tests {
     fn laid(size: (u16, u16), depth: ColorDepth) -> Vec<String> {
         let picture = Picture { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
-        let shades = Shades::new(depth, &XTERM);
+        let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
         let buffers =
             laid_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
@@ -107,14 +108,14 @@ mod tests {
     }
 
     #[test]
-    fn they_are_beside_each_other_where_there_is_room() {
+    fn wide_terminals_show_images_side_by_side() {
         let lines = laid((100, 60), ColorDepth::TrueColor);
         assert!(lines[0].starts_with("a.png ") && lines[0].contains("b.png"), "{lines:?}");
         assert_eq!((lines.len(), widest(&lines)), (1 + 12, 32 * 3 + 2 * 2), "{lines:?}");
     }
 
     #[test]
-    fn they_are_below_each_other_in_a_narrow_terminal_and_nowhere_in_a_narrower_one() {
+    fn narrow_terminals_stack_images_or_omit_them() {
         let lines = laid((40, 24), ColorDepth::TrueColor);
         assert_eq!((lines.len(), lines[8].as_str()), (3 * 8, "b.png"), "{lines:?}");
         assert!(widest(&lines) <= 40, "{lines:?}");
@@ -123,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn without_colors_they_are_characters() {
+    fn images_without_colors_are_characters() {
         let lines = laid((100, 60), ColorDepth::None);
         assert!(lines.len() > 8 && lines[1..].iter().all(|line| line.is_ascii()), "{lines:?}");
     }

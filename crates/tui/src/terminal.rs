@@ -1,7 +1,8 @@
-//! The terminal: taken, given back, whatever happens.
+//! Terminal setup and restoration.
 //!
-//! One [`TerminalSession`] owns it. It is given back when the screen is dropped, when the front end's thread panics (by a
-//! hook that is chained once), before the program stops, and by [`rescue`] when the front end is stuck.
+//! A [`TerminalSession`] owns the terminal. It is restored when the session is dropped, when the front end's
+//! thread panics (with a hook that is installed once), before the process stops, and with [`rescue`] when the
+//! front end is blocked.
 
 use std::cell::Cell;
 use std::io::{self, IsTerminal, Write};
@@ -30,57 +31,58 @@ use super::window_title::{KEEP_TITLE, PROGRESS_OFF, TITLE_BACK};
 use super::writer;
 use crate::system::abort;
 
-/// Whether the screen is taken.
+/// Whether the alternate screen is active.
 static TAKEN: AtomicBool = AtomicBool::new(false);
-/// Whether the mouse is wanted.
+/// Whether mouse reports are enabled.
 static MOUSE: AtomicBool = AtomicBool::new(true);
-/// Whether keys come raw.
+/// Whether the terminal is in raw mode.
 static RAW: AtomicBool = AtomicBool::new(false);
-/// Whether the terminal is to report the focus.
+/// Whether focus reports are enabled.
 static FOCUS: AtomicBool = AtomicBool::new(false);
-/// Whether the window has a title of glimt's.
+/// Whether the window title was changed.
 static HAS_TITLE: AtomicBool = AtomicBool::new(false);
-/// Whether the window may have a bar of progress.
+/// Whether a progress bar may be shown.
 static HAS_PROGRESS: AtomicBool = AtomicBool::new(false);
-/// Whether a link may be open in the text.
+/// Whether a hyperlink may be open.
 static HAS_LINKS: AtomicBool = AtomicBool::new(false);
-/// Whether the terminal keeps images that have to be deleted.
+/// Whether the terminal stores images that must be deleted.
 static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
-/// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
+/// The thread whose panic restores the terminal. Panics of other threads are stored in [`PANIC`].
 static OWNER: Mutex<Option<ThreadId>> = Mutex::new(None);
-/// Message of the last panic of another thread.
+/// Message of the last panic in another thread.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Presses, movements with a button down, in SGR form. (crossterm's own command turns on all movements.)
+/// Button events and drags, in SGR format. (crossterm's own command enables all movements.)
 const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
 const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 
-/// Reports of the focus (mode 1004).
+/// Focus reports (mode 1004).
 const FOCUS_ON: &str = "\x1b[?1004h";
 const FOCUS_OFF: &str = "\x1b[?1004l";
 
-/// Other changes that glimt may have made, with the bytes that take them back.
+/// Other changes that glimt may have made, with the bytes that undo them.
 static CHANGES: [(&AtomicBool, &[u8]); 4] = [
     (&HAS_LINKS, LINK_OFF),
     (&HAS_TITLE, TITLE_BACK),
     (&HAS_PROGRESS, PROGRESS_OFF),
     (&FOCUS, FOCUS_OFF.as_bytes()),
 ];
-/// End of a control string, in case one was cut: the terminal would add the text behind it to that string.
+/// Terminates a control string that may have been cut off; otherwise the terminal would treat the following
+/// text as part of it.
 const STRING_END: &[u8] = b"\x1b\\";
 
-/// Half blocks are about square at this height over width of a cell.
+/// With this height-to-width ratio of cells, half blocks are square.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
-/// A cell of many fonts.
+/// Typical size of a cell.
 const DEFAULT_CELL_PIXELS: (u16, u16) = (8, 16);
-/// Time to wait for a terminal that takes nothing, at each step of giving it back.
+/// Timeout of each restoration step when the terminal accepts no output.
 const STUCK: Duration = Duration::from_millis(60);
 
-/// The terminal, taken.
+/// The terminal in use by the front end.
 pub(super) struct TerminalSession(());
 
 impl TerminalSession {
-    /// Takes the terminal: raw mode, alternate screen, no cursor.
+    /// Sets up the terminal: raw mode, alternate screen, no cursor.
     pub(super) fn open() -> Result<Self, TuiError> {
         chain_panic_hook();
         prepare_abort();
@@ -88,44 +90,44 @@ impl TerminalSession {
         Ok(Self(()))
     }
 
-    /// Whether it may be drawn on.
+    /// Whether the screen may be drawn on.
     pub(super) fn is_taken(&self) -> bool {
         TAKEN.load(Ordering::Acquire)
     }
 
-    /// Gives the screen back and keeps the keys, until [`TerminalSession::resume`] or the end: what the terminal still answers
-    /// must not be echoed.
+    /// Restores the screen but keeps raw mode until [`TerminalSession::resume`] or the end, so that late
+    /// replies are not echoed.
     pub(super) fn leave(&mut self) {
         leave_screen();
     }
 
-    /// Gives the terminal back until [`TerminalSession::resume`].
+    /// Restores the terminal until [`TerminalSession::resume`].
     pub(super) fn suspend(&mut self) {
         give_back();
     }
 
-    /// Takes the terminal again, whoever changed its modes.
+    /// Sets up the terminal again.
     pub(super) fn resume(&mut self) -> io::Result<()> {
-        // What a shell set while the program was stopped is no longer what was saved when it was taken.
+        // A shell may have changed the modes while the process was stopped, so save them again.
         if RAW.swap(false, Ordering::AcqRel) {
             disable_raw_mode()?;
         }
         take()
     }
 
-    /// Has the terminal report the mouse, or leave it to its own.
+    /// Enables or disables mouse reports.
     pub(super) fn set_mouse(&mut self, is_on: bool) {
         MOUSE.store(is_on, Ordering::Release);
         writer::send(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
     }
 
-    /// Has the terminal report the focus.
+    /// Enables focus reports.
     pub(super) fn report_focus(&mut self) {
         will_report_focus();
         writer::send(FOCUS_ON.as_bytes().to_vec());
     }
 
-    /// The terminal is gone: nothing more is written to it.
+    /// Stops writing to a terminal that no longer exists.
     pub(super) fn abandon(self) {
         TAKEN.store(false, Ordering::Release);
         RAW.store(false, Ordering::Release);
@@ -138,16 +140,16 @@ impl Drop for TerminalSession {
     }
 }
 
-/// The modes of the terminal as another program found them. `None` unless another program has the terminal.
+/// Terminal modes before another program got the terminal. `None` at other times.
 static LENT: Mutex<Option<Termios>> = Mutex::new(None);
 
-/// Leaves the terminal to another program, until [`take_back`].
+/// Saves the terminal modes for [`take_back`] before another program uses the terminal.
 pub(super) fn lend() {
     *LENT.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
-/// Sets the modes of the terminal as they were when it was lent: a program that was killed leaves its own. Errors are of
-/// no use: there is nothing else to be done.
+/// Restores the modes saved by [`lend`], since a killed program may leave its own. Errors are ignored because
+/// nothing can be done about them.
 pub(super) fn take_back() {
     if let Some(modes) = LENT.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
@@ -162,7 +164,7 @@ fn take() -> io::Result<()> {
     enter(&mut io::stdout()).inspect_err(|_| give_back())
 }
 
-/// Gives the terminal back, if it is taken. Errors are of no use: there is nobody left to tell.
+/// Restores the terminal if it is in use. Errors are ignored because they cannot be reported.
 fn give_back() {
     leave_screen();
     if RAW.swap(false, Ordering::AcqRel) {
@@ -170,8 +172,8 @@ fn give_back() {
     }
 }
 
-/// Gives the screen back, if it is taken. What has not been sent is dropped; a terminal that takes nothing loses what
-/// the system keeps for it as well, and is waited for no longer than three times [`STUCK`].
+/// Restores the screen if it is in use. Unsent output is dropped. If the terminal accepts nothing, output
+/// buffered by the system is dropped as well, and this returns within three times [`STUCK`].
 fn leave_screen() {
     if !TAKEN.swap(false, Ordering::AcqRel) {
         return;
@@ -182,15 +184,15 @@ fn leave_screen() {
     }
     let mut bytes = Vec::new();
     let (deadline, dropped) = (Instant::now() + STUCK, Cell::new(false));
-    // Nobody else writes: once what the system keeps has been dropped there is room.
+    // Nothing else writes, so dropping the system's buffer makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = leave(&mut bytes)
         .and_then(|()| writer::output())
         .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
 }
 
-/// Gives the terminal back from another thread while the owner may be stuck. Returns soon; a terminal that takes
-/// nothing keeps the writer waiting, not the caller.
+/// Restores the terminal from another thread while its owner may be blocked. Returns soon; if the terminal
+/// accepts nothing, only the spawned thread waits.
 pub(super) fn rescue() {
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
@@ -204,31 +206,31 @@ pub(super) fn rescue() {
     }
 }
 
-/// Bytes and modes with which an abort gives the terminal back, without an allocation.
+/// Data for restoring the terminal on abort without allocating.
 static LAST_WORDS: OnceLock<RestoreData> = OnceLock::new();
 
 struct RestoreData {
-    /// The modes of the terminal before it was first taken.
+    /// Terminal modes before setup.
     modes: Option<nix::libc::termios>,
-    /// The bytes that delete images.
+    /// Bytes that delete images.
     delete_images: Vec<u8>,
-    /// The bytes that give the screen back.
+    /// Bytes that restore the screen.
     leave: Vec<u8>,
 }
 
-/// Has an abort, as of a failed allocation, give the terminal back.
+/// Prepares for restoring the terminal on abort, for example after a failed allocation.
 fn prepare_abort() {
     LAST_WORDS.get_or_init(|| {
         let (mut delete_images, mut leave) = (Vec::new(), Vec::new());
-        // Writing to memory does not fail.
+        // Writing to a vector does not fail.
         let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
         RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
     abort::set_terminal_restore(give_back_at_once);
 }
 
-/// Gives the terminal back by async-signal-safe calls alone: no lock, no allocation. A terminal that takes nothing is
-/// waited for no longer than [`STUCK`].
+/// Restores the terminal using only async-signal-safe calls: no locks, no allocations. Waits at most
+/// [`STUCK`] for a terminal that accepts nothing.
 fn give_back_at_once() {
     let Some(words) = LAST_WORDS.get() else { return };
     if TAKEN.swap(false, Ordering::AcqRel) {
@@ -254,32 +256,33 @@ fn give_back_at_once() {
     }
 }
 
-/// From now on the terminal may keep kitty's images, or have been cut in the middle of a string.
+/// Records that kitty images may be stored and that control strings may be cut off.
 pub(super) fn will_have_images() {
     HAS_IMAGES.store(true, Ordering::Release);
 }
 
-/// The terminal is to report the focus whenever it is taken.
+/// Enables focus reports whenever the terminal is set up.
 pub(super) fn will_report_focus() {
     FOCUS.store(true, Ordering::Release);
 }
 
-/// Bytes to send before the window gets a title: empty unless it has its own yet.
+/// Bytes to send before setting a window title: they save the original one, the first time.
 pub(super) fn before_title() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
 
-/// From now on the window may have a bar of progress.
+/// Records that a progress bar may be shown.
 pub(super) fn will_have_progress() {
     HAS_PROGRESS.store(true, Ordering::Release);
 }
 
-/// From now on a link may be open.
+/// Records that a hyperlink may be open.
 pub(super) fn will_have_links() {
     HAS_LINKS.store(true, Ordering::Release);
 }
 
-/// Bytes that take back what else was changed. Each is given once, but for modes, which are set whenever the terminal is taken.
+/// Bytes that undo the other changes. Each is returned once, except for modes, which are set again whenever
+/// the terminal is set up.
 fn taken_back() -> impl Iterator<Item = &'static [u8]> {
     let mut is_first = true;
     CHANGES.iter().flat_map(move |(flag, bytes)| {
@@ -290,7 +293,7 @@ fn taken_back() -> impl Iterator<Item = &'static [u8]> {
     })
 }
 
-/// The bytes that take the screen.
+/// Writes the bytes that set up the screen.
 fn enter(out: &mut impl Write) -> io::Result<()> {
     let mouse = if MOUSE.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
     let focus = if FOCUS.load(Ordering::Acquire) { FOCUS_ON } else { "" };
@@ -305,7 +308,7 @@ fn enter(out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// The bytes that give it back, from any state that a frame can be cut in.
+/// Writes the bytes that restore the screen, from any state in which a frame may have been cut off.
 fn leave(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
         leave_images(out)?;
@@ -314,13 +317,13 @@ fn leave(out: &mut impl Write) -> io::Result<()> {
     leave_text(out)
 }
 
-/// The bytes that delete the images that the terminal keeps.
+/// Writes the bytes that delete stored images.
 fn leave_images(out: &mut impl Write) -> io::Result<()> {
     out.write_all(STRING_END)?;
     out.write_all(&graphics::delete_all())
 }
 
-/// The bytes that end what a frame may have begun, and show the shell's screen.
+/// Writes the bytes that end an unfinished frame and return to the shell's screen.
 fn leave_text(out: &mut impl Write) -> io::Result<()> {
     execute!(
         out,
@@ -333,8 +336,9 @@ fn leave_text(out: &mut impl Write) -> io::Result<()> {
     )
 }
 
-/// While the terminal is taken, a panic of its owner gives it back and is then reported as always; a panic of
-/// another thread would be lost on the alternate screen and is kept for [`last_panic`].
+/// Installs the panic hook. While the terminal is in use, a panic of its owner restores it before it is
+/// reported. A panic of another thread would be lost on the alternate screen, so it is stored for
+/// [`last_panic`].
 fn chain_panic_hook() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -351,12 +355,12 @@ fn chain_panic_hook() {
     });
 }
 
-/// Message of the last panic of another thread.
+/// Message of the last panic in another thread.
 pub(super) fn last_panic() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
 
-/// An error where keys or screen are no terminal.
+/// Fails if stdin or stdout is not a terminal.
 pub(super) fn require() -> Result<(), TuiError> {
     if !io::stdin().is_terminal() {
         return Err(TuiError::NotATerminal { stream: "standard input" });
@@ -367,12 +371,13 @@ pub(super) fn require() -> Result<(), TuiError> {
     Ok(())
 }
 
-/// Whether both ends of the terminal are still there.
+/// Whether the terminal still exists.
 pub(super) fn is_there() -> bool {
     require().is_ok()
 }
 
-/// The size of the window; the aspect of a cell as given, else from the window's size in pixels, else 2.
+/// Window size and cell aspect. The aspect is `cell_aspect` if given, else derived from the window's size in
+/// pixels, else 2.
 pub(super) fn window(cell_aspect: Option<f32>) -> Window {
     match terminal::window_size() {
         Ok(size) => bounded(Window {
@@ -394,12 +399,13 @@ pub(super) fn window(cell_aspect: Option<f32>) -> Window {
     }
 }
 
-/// Most columns that are drawn: more than a wall of screens has.
+/// Maximum number of columns drawn, more than any wall of screens has.
 const MOST_COLUMNS: u16 = 4096;
-/// Most cells that are drawn. Each takes some hundred bytes, and terminals may report 65,535 columns and rows.
+/// Maximum number of cells drawn. Each takes hundreds of bytes, and terminals may report 65,535 columns and
+/// rows.
 const MOST_CELLS: u32 = 1 << 20;
 
-/// The part of a window that is drawn.
+/// Limits a window to the part that is drawn.
 fn bounded(window: Window) -> Window {
     let columns = window.columns.min(MOST_COLUMNS);
     let most_rows = MOST_CELLS / u32::from(columns.max(1));
@@ -407,8 +413,8 @@ fn bounded(window: Window) -> Window {
     Window { columns, rows, ..window }
 }
 
-/// Height over width of a cell. Sizes in pixels are often zero or nonsense; values within 3% of 2 are 2, so that
-/// pictures need no scaling.
+/// Height-to-width ratio of a cell. Sizes in pixels are often zero or nonsense. Values within 3% of 2 are
+/// rounded to 2 so that previews need no scaling.
 fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     let width = f32::from(pixels.0) / f32::from(cells.0);
     let height = f32::from(pixels.1) / f32::from(cells.1);
@@ -417,7 +423,7 @@ fn aspect(cells: (u16, u16), pixels: (u16, u16)) -> f32 {
     if sane && (aspect - DEFAULT_CELL_ASPECT).abs() > 0.06 { aspect } else { DEFAULT_CELL_ASPECT }
 }
 
-/// Width and height of a cell in pixels, where the sizes make sense.
+/// Size of a cell in pixels, if it is plausible.
 fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
     let side = |pixels: u16, cells: u16| pixels.checked_div(cells).filter(|side| (2..=100).contains(side));
     side(pixels.0, cells.0).zip(side(pixels.1, cells.1)).unwrap_or(DEFAULT_CELL_PIXELS)
@@ -427,7 +433,7 @@ fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
 mod tests {
     use super::*;
 
-    /// Lock for one test at a time: the changes to be taken back are those of the process.
+    /// Serializes the tests, which share process-wide state.
     static ALONE: Mutex<()> = Mutex::new(());
 
     fn alone() -> std::sync::MutexGuard<'static, ()> {
@@ -436,7 +442,7 @@ mod tests {
 
     fn bytes(write: impl Fn(&mut Vec<u8>) -> io::Result<()>) -> String {
         let mut out = Vec::new();
-        write(&mut out).expect("a vector takes everything");
+        write(&mut out).expect("writing to a vector");
         String::from_utf8(out).expect("ASCII")
     }
 
@@ -454,7 +460,7 @@ mod tests {
     }
 
     #[test]
-    fn title_progress_and_links_are_taken_back_once() {
+    fn title_progress_and_links_are_undone_once() {
         let _alone = alone();
         let all = || taken_back().collect::<Vec<_>>();
         assert!(all().is_empty());
@@ -463,12 +469,12 @@ mod tests {
         will_have_links();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
-        assert_eq!(before_title(), KEEP_TITLE, "taken again, it is kept again");
+        assert_eq!(before_title(), KEEP_TITLE, "saved again when set again");
         assert_eq!(all(), [STRING_END, TITLE_BACK]);
     }
 
     #[test]
-    fn the_screen_is_left_in_a_vt100() {
+    fn vt100_screen_is_restored() {
         let _alone = alone();
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let mut screen = vt100::Parser::new(side(5), side(20), 0);
@@ -482,7 +488,7 @@ mod tests {
     }
 
     #[test]
-    fn the_aspect_of_a_cell_is_believed_when_it_is_sane() {
+    fn implausible_cell_aspects_are_ignored() {
         assert_eq!(aspect((80, 24), (80 * 8, 24 * 18)), 2.25);
         assert_eq!(aspect((80, 24), (0, 0)), 2.0);
         assert_eq!(aspect((0, 0), (640, 480)), 2.0);
@@ -491,7 +497,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_of_any_size_has_a_bounded_number_of_cells() {
+    fn number_of_cells_is_bounded() {
         let of = |columns, rows| {
             let cell_pixels = DEFAULT_CELL_PIXELS;
             let drawn = bounded(Window { columns, rows, cell_aspect: DEFAULT_CELL_ASPECT, cell_pixels });
@@ -508,14 +514,14 @@ mod tests {
     }
 
     #[test]
-    fn pixels_of_a_cell_are_believed_when_they_make_sense() {
+    fn implausible_cell_sizes_are_ignored() {
         assert_eq!(cell_pixels((80, 24), (80 * 9, 24 * 18 + 3)), (9, 18));
         assert_eq!(cell_pixels((80, 24), (0, 0)), DEFAULT_CELL_PIXELS);
         assert_eq!(cell_pixels((0, 0), (640, 480)), DEFAULT_CELL_PIXELS);
     }
 
     #[test]
-    fn giving_back_what_was_not_taken_does_nothing() {
+    fn restoring_an_unused_terminal_does_nothing() {
         let _alone = alone();
         assert!(!TAKEN.load(Ordering::Acquire));
         give_back();

@@ -1,13 +1,13 @@
-//! Answers of terminals, and questions to ask them.
+//! Queries to terminals and their replies.
 
 use super::graphics::Protocol;
 use super::pixel_request::PixelRequest;
 use super::terminals::{Brand, TerminalId};
 
-/// The finest blocks that a terminal draws itself, whatever its font.
+/// The finest block characters that a terminal draws itself, independently of its font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BlockGlyphs {
-    /// Nothing is known.
+    /// Not known.
     Unknown,
     /// Unicode 13.
     Sextants,
@@ -16,7 +16,7 @@ pub(super) enum BlockGlyphs {
 }
 
 impl BlockGlyphs {
-    /// Blocks of a terminal of this version; all those that are known draw sextants since long.
+    /// Block characters of a terminal version. All terminals listed here have long drawn sextants.
     pub(super) fn of(terminal: TerminalId) -> Self {
         let octants_since = match terminal.brand {
             Brand::Kitty => [0, 40],
@@ -38,51 +38,51 @@ impl BlockGlyphs {
     }
 }
 
-/// A report of the terminal, to a question or of its own accord.
+/// A report from the terminal, solicited or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TerminalReply {
-    /// To a status report (DSR 5): all that was sent before has been processed.
+    /// Status report (DSR 5): everything sent before it has been processed.
     Ready,
-    /// To a question for the primary device attributes (DA1).
+    /// Primary device attributes (DA1).
     Attributes,
-    /// Whether mode 2026 is known, by which large changes appear at once.
+    /// Whether mode 2026, synchronized output, is supported.
     Synchronized { is_known: bool },
-    /// The terminal and its version (XTVERSION), if glimt knows its name.
+    /// Name and version (XTVERSION), if glimt knows the terminal.
     Name(TerminalId),
-    /// Whether its window has the focus now (mode 1004).
+    /// Whether the window has the focus (mode 1004).
     Focus { is_here: bool },
-    /// It has 24 bits of color (XTGETTCAP).
+    /// 24-bit color is supported (XTGETTCAP).
     TrueColor,
-    /// Its background, in sRGB (OSC 11).
+    /// Background color in sRGB (OSC 11).
     Background([u8; 3]),
-    /// It shows images by this protocol.
+    /// Images are supported with this protocol.
     Images(Protocol),
-    /// One of its palette, in sRGB (OSC 4).
+    /// A palette color in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
-    /// Any other report: the cursor's position, modes, colors, other names.
+    /// Any other report.
     Other,
 }
 
-/// Questions to the terminal: only useful ones, and only if the terminal itself answers. glimt ignores answers to other
-/// questions.
+/// Queries to send, only if they are useful and the terminal itself will answer. Replies to other queries are
+/// ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct TerminalQueries {
-    /// The blocks that it draws, by its name.
+    /// Block characters, from the terminal's name.
     pub(super) blocks: bool,
-    /// Its name, for what it can do besides.
+    /// Other capabilities, from the terminal's name.
     pub(super) name: bool,
-    /// Whether it has 24 bits of color.
+    /// Support for 24-bit color.
     pub(super) true_color: bool,
-    /// Its background.
+    /// Background color.
     pub(super) background: bool,
-    /// Its 16 colors.
+    /// The 16 ANSI colors.
     pub(super) palette: bool,
-    /// Whether it shows images.
+    /// Support for images.
     pub(super) pixels: Option<PixelRequest>,
 }
 
 impl TerminalQueries {
-    /// The bytes of the questions.
+    /// The bytes of the queries.
     pub(super) fn questions(self) -> Vec<u8> {
         let mut questions = Vec::new();
         let mut ask = |is_asked: bool, bytes: &[u8]| {
@@ -93,7 +93,7 @@ impl TerminalQueries {
         let pixels = self.pixels.map(PixelRequest::question).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
         ask(true, &pixels);
-        // `RGB` and `Tc`, in hexadecimal digits.
+        // `RGB` and `Tc` in hexadecimal.
         ask(self.true_color, b"\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\");
         ask(self.background, b"\x1b]11;?\x1b\\");
         for index in 0..16 {
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_is_of_use_is_asked() {
+    fn only_useful_queries_are_sent() {
         assert!(TerminalQueries::default().questions().is_empty());
         for ask in [
             TerminalQueries { blocks: true, ..TerminalQueries::default() },
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn octants_came_with_a_version() {
+    fn octants_depend_on_the_version() {
         for (report, blocks) in [
             ("kitty(0.40.1)", BlockGlyphs::Octants),
             ("kitty(0.35.2)", BlockGlyphs::Sextants),

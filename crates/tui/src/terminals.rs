@@ -1,6 +1,7 @@
-//! Terminals by name and version, and what each is known to do besides text. Nothing of it is sent to others.
+//! Known terminals and their capabilities beyond text. Unknown terminals get none of the sequences listed
+//! here.
 
-/// Terminals that glimt knows by name.
+/// Terminals that glimt recognizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Brand {
     Kitty,
@@ -21,44 +22,44 @@ pub(super) enum Brand {
     Xterm,
 }
 
-/// A terminal and its version: `[0, 0]` if that is unknown.
+/// A terminal and its version, `[0, 0]` if unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TerminalId {
     pub(super) brand: Brand,
     pub(super) version: [u32; 2],
 }
 
-/// Protocols of notifications on the desktop.
+/// Protocols for desktop notifications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NotificationProtocol {
-    /// iTerm2's.
+    /// iTerm2's protocol.
     Osc9,
-    /// kitty's.
+    /// kitty's protocol.
     Osc99,
-    /// rxvt-unicode's, with a title.
+    /// The protocol of rxvt-unicode, with a title.
     Osc777,
-    /// The bell, by which a window asks for attention.
+    /// The bell, which makes a window ask for attention.
     Bell,
 }
 
-/// Abilities of a terminal besides text.
+/// Capabilities of a terminal beyond text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Capabilities {
-    /// A title of the window (OSC 2).
+    /// Window titles (OSC 2).
     pub(super) title: bool,
-    /// A bar of progress in the window's frame (OSC 9;4).
+    /// A progress bar in the window frame or taskbar (OSC 9;4).
     pub(super) progress: bool,
     pub(super) notice: Option<NotificationProtocol>,
-    /// Reports whether it has the focus (mode 1004).
+    /// Focus reports (mode 1004).
     pub(super) focus: bool,
-    /// Links in text (OSC 8).
+    /// Hyperlinks (OSC 8).
     pub(super) links: bool,
-    /// Takes text for the clipboard (OSC 52), perhaps after a question.
+    /// Clipboard access (OSC 52), possibly after asking the user.
     pub(super) clipboard: bool,
 }
 
 impl Brand {
-    /// The terminal that `TERM_PROGRAM` names so. `None` if glimt knows none of that name.
+    /// The terminal with this `TERM_PROGRAM`. `None` if unknown.
     pub(super) fn of_program(name: &str) -> Option<Self> {
         const PROGRAMS: [(&str, Brand); 6] = [
             ("ghostty", Brand::Ghostty),
@@ -71,7 +72,7 @@ impl Brand {
         PROGRAMS.iter().find(|(known, _)| *known == name).map(|(_, brand)| *brand)
     }
 
-    /// Whether a terminal that `TERM_PROGRAM` names has 24 bits of color and repeats characters (REP).
+    /// Whether a terminal identified by `TERM_PROGRAM` supports 24-bit color and REP.
     pub(super) fn has_colors_and_repeats(self) -> bool {
         match self {
             Self::Ghostty | Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
@@ -89,7 +90,7 @@ impl Brand {
         }
     }
 
-    /// Whether it shows images by iTerm2's protocol.
+    /// Whether it supports iTerm2's inline images.
     pub(super) fn has_iterm_images(self) -> bool {
         match self {
             Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
@@ -110,7 +111,7 @@ impl Brand {
 }
 
 impl TerminalId {
-    /// A terminal as XTVERSION reports it: `foot(1.20.2)`, `ghostty 1.2.0`.
+    /// Parses an XTVERSION report such as `foot(1.20.2)` or `ghostty 1.2.0`.
     pub(super) fn of_report(report: &str) -> Option<Self> {
         const NAMES: [(&str, Brand); 10] = [
             ("kitty", Brand::Kitty),
@@ -129,8 +130,8 @@ impl TerminalId {
         Some(Self { brand: *brand, version: version(rest.get(1..).unwrap_or_default()) })
     }
 
-    /// The terminal that the environment tells of. `None` if it tells of none, and inside tmux and screen, which keep such
-    /// sequences for themselves.
+    /// Detects the terminal from environment variables. `None` if unknown, and inside tmux and screen, which
+    /// do not pass on the sequences.
     pub(super) fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         const TERMS: [(&str, Brand); 6] = [
             ("xterm-kitty", Brand::Kitty),
@@ -147,7 +148,7 @@ impl TerminalId {
             return None;
         }
         let known = |brand: Brand, number: &str| Some(Self { brand, version: version(&get(number)) });
-        // A terminal within another one overwrites these two.
+        // Terminals that run inside another one overwrite these two variables.
         if let Some(brand) = Brand::of_program(&get("TERM_PROGRAM")) {
             return known(brand, "TERM_PROGRAM_VERSION");
         }
@@ -159,19 +160,19 @@ impl TerminalId {
             () if get("ConEmuANSI") == "ON" => known(Brand::ConEmu, ""),
             () if is_set("VTE_VERSION") => known(Brand::Vte, "VTE_VERSION"),
             () if is_set("KONSOLE_VERSION") => {
-                // 250402 is 25.04.2.
+                // 250402 is version 25.04.2.
                 let number: u32 = get("KONSOLE_VERSION").parse().unwrap_or(0);
                 Some(Self { brand: Brand::Konsole, version: [number / 10_000, number / 100 % 100] })
             }
             () if is_set("XTERM_VERSION") => known(Brand::Xterm, ""),
-            // Over SSH, iTerm2 alone has its name passed on by default.
+            // Over SSH, only iTerm2 has its name forwarded by default.
             () if get("LC_TERMINAL") == "iTerm2" => known(Brand::Iterm2, "LC_TERMINAL_VERSION"),
             () => None,
         }
     }
 
-    /// Its abilities, by its documentation.
-    pub(super) fn abilities(self) -> Capabilities {
+    /// Capabilities according to the terminal's documentation.
+    pub(super) fn capabilities(self) -> Capabilities {
         let Self { brand, version } = self;
         let all = Capabilities {
             title: true,
@@ -190,7 +191,7 @@ impl TerminalId {
             Brand::Ghostty => {
                 Capabilities { notice: Some(NotificationProtocol::Osc777), progress: since([1, 2]), ..all }
             }
-            // Before, it took such a sequence for a notification.
+            // Older versions showed the sequence as a notification.
             Brand::WezTerm => Capabilities {
                 notice: Some(NotificationProtocol::Osc777),
                 progress: since([20_250_301, 0]),
@@ -207,7 +208,7 @@ impl TerminalId {
             Brand::Vte => {
                 Capabilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
             }
-            // By default, xterm refuses text for the clipboard.
+            // xterm rejects clipboard access by default.
             Brand::Xterm => Capabilities { links: false, clipboard: false, ..all },
             Brand::ConEmu => Capabilities { title: true, progress: true, ..Capabilities::default() },
             Brand::AppleTerminal => {
@@ -217,12 +218,12 @@ impl TerminalId {
     }
 }
 
-/// Whether a terminal of this name has text and colors alone, or keeps other sequences for itself.
+/// Whether a terminal with this name supports only text and colors, or intercepts other sequences.
 fn is_without_extras(term: &str) -> bool {
     term.is_empty() || ["linux", "dumb", "vt", "screen", "tmux"].iter().any(|name| term.starts_with(name))
 }
 
-/// The first two numbers of a version.
+/// The first two numbers of a version string.
 fn version(text: &str) -> [u32; 2] {
     let mut numbers = text.split(|c: char| !c.is_ascii_digit());
     let mut number = || numbers.next().and_then(|digits| digits.parse().ok()).unwrap_or(0);
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn terminals_are_known_by_their_variables() {
+    fn terminals_are_detected_from_variables() {
         let xterm = ("TERM", "xterm-256color");
         for (pairs, brand, version) in [
             (&[("TERM", "xterm-kitty")][..], Brand::Kitty, [0, 0]),
@@ -259,7 +260,7 @@ mod tests {
                 Brand::WezTerm,
                 [20_240_203, 110_809],
             ),
-            // VS Code within kitty.
+            // VS Code started from kitty.
             (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
         ] {
             assert_eq!(found(pairs), Some(TerminalId { brand, version }), "{pairs:?}");
@@ -267,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_to_show_it_gets_nothing() {
+    fn unknown_terminals_are_not_detected() {
         let wezterm = ("TERM_PROGRAM", "WezTerm");
         for pairs in [
             &[][..],
@@ -285,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn progress_came_with_a_version() {
+    fn progress_bar_depends_on_the_version() {
         for (report, has_progress) in [
             ("ghostty 1.2.0", true),
             ("ghostty 1.1.3-arch2", false),
@@ -299,7 +300,7 @@ mod tests {
             ("XTerm(390)", false),
         ] {
             let terminal = TerminalId::of_report(report).expect(report);
-            assert_eq!(terminal.abilities().progress, has_progress, "{report}");
+            assert_eq!(terminal.capabilities().progress, has_progress, "{report}");
         }
     }
 }

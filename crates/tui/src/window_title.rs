@@ -1,6 +1,6 @@
-//! The frame of the terminal's window: its title, a bar of progress, notifications; and the clipboard.
+//! Window title, progress bar, desktop notifications and clipboard of the terminal.
 //!
-//! Each is sent only to terminals that are known to have it (see `terminals`), and behind the picture.
+//! Each is sent after the preview and only to terminals known to support it (see `terminals`).
 
 use std::time::Duration;
 
@@ -10,24 +10,24 @@ use super::terminals::NotificationProtocol;
 use super::view;
 use crate::scene::sanitize::visible;
 
-/// Time after which title and progress show a render: a camera on its way is no news.
+/// Time after which title and progress bar show a render, so that camera movement does not change them.
 const SHORT: Duration = Duration::from_millis(500);
-/// Step of the percentage over a line that takes time.
+/// Percentage step on a slow connection.
 const COARSE: u32 = 10;
 
-/// Bytes that keep the window's title for [`TITLE_BACK`].
+/// Saves the window title for [`TITLE_BACK`].
 pub(super) const KEEP_TITLE: &[u8] = b"\x1b[22;2t";
-/// Bytes that give the window back the title that it had; where none was kept, its default one.
+/// Restores the window title, or the default one if none was saved.
 pub(super) const TITLE_BACK: &[u8] = b"\x1b]2;\x1b\\\x1b[23;2t";
-/// Bytes that remove the bar of progress.
+/// Removes the progress bar.
 pub(super) const PROGRESS_OFF: &[u8] = b"\x1b]9;4;0;0\x1b\\";
 
-/// A bar of progress.
+/// State of the progress bar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum ProgressBar {
     #[default]
     None,
-    /// At work, nobody knows for how long.
+    /// Working for an unknown time.
     Busy,
     Percent(u32),
     Paused(u32),
@@ -47,7 +47,7 @@ impl ProgressBar {
     }
 }
 
-/// Title and progress of the window, as far as the terminal has them.
+/// Window title and progress bar, where the terminal supports them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct WindowTitle {
     pub(super) title: Option<String>,
@@ -55,9 +55,10 @@ pub(super) struct WindowTitle {
 }
 
 impl WindowTitle {
-    /// Title, progress and links of the state; `is_slow` says that the line takes time. `None` if they stay as they are.
+    /// Title and progress of the state, in coarser steps if the connection `is_slow`. `None` if they should
+    /// not change.
     pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
-        let abilities = state.display.abilities;
+        let capabilities = state.display.capabilities;
         if state.work.running_for(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
             return None;
         }
@@ -65,12 +66,12 @@ impl WindowTitle {
         let step = if is_slow { COARSE } else { 1 };
         let percent = progress.map(|progress| view::text::percent(progress.fraction) / step * step);
         Some(Self {
-            title: abilities.title.then(|| title(state, percent)),
-            bar: abilities.progress.then(|| bar(state, percent)),
+            title: capabilities.title.then(|| title(state, percent)),
+            bar: capabilities.progress.then(|| bar(state, percent)),
         })
     }
 
-    /// Bytes that lead from one to another.
+    /// Bytes that change the title and progress bar to those of `to`.
     pub(super) fn changes(&self, to: &Self) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(title) = to.title.as_ref().filter(|_| self.title != to.title) {
@@ -90,7 +91,7 @@ fn title(state: &State, percent: Option<u32>) -> String {
     format!("{}: {word}{percent} · glimt", name(state))
 }
 
-/// The scene's name.
+/// File name of the scene.
 fn name(state: &State) -> String {
     let name = state.request.scene.file_name().unwrap_or(state.request.scene.as_os_str());
     visible(&name.to_string_lossy()).into_owned()
@@ -105,7 +106,7 @@ fn bar(state: &State, percent: Option<u32>) -> ProgressBar {
     }
 }
 
-/// Bytes of a notification that a render has ended, after so long.
+/// Bytes of a notification that a render has ended after `time`.
 pub(super) fn notice(state: &State, notice: NotificationProtocol, time: Duration) -> Vec<u8> {
     let words = format!("{}: {} after {}", name(state), view::state_word(state), view::text::duration(time));
     match notice {
@@ -116,7 +117,7 @@ pub(super) fn notice(state: &State, notice: NotificationProtocol, time: Duration
     }
 }
 
-/// Bytes that put a text into the clipboard.
+/// Bytes that copy text to the clipboard.
 pub(super) fn copy(text: &str) -> Vec<u8> {
     [b"\x1b]52;c;", &*base64::encoded(text.as_bytes()), b"\x1b\\"].concat()
 }
@@ -130,7 +131,7 @@ mod tests {
 
     fn ui() -> TestUi {
         let mut ui = TestUi::new();
-        ui.state.display.abilities = TerminalId { brand: Brand::Ghostty, version: [1, 2] }.abilities();
+        ui.state.display.capabilities = TerminalId { brand: Brand::Ghostty, version: [1, 2] }.capabilities();
         ui
     }
 
@@ -142,40 +143,40 @@ mod tests {
     }
 
     #[test]
-    fn the_window_says_what_is_going_on() {
-        let (mut ui, mut chrome) = (ui(), WindowTitle::default());
-        assert_eq!(sent(&mut chrome, &ui, false), "", "a short render is no news");
+    fn title_and_progress_bar_follow_the_render() {
+        let (mut ui, mut shown_title) = (ui(), WindowTitle::default());
+        assert_eq!(sent(&mut shown_title, &ui, false), "", "short renders are not shown");
         ui.wait(600);
         let busy = "\x1b]2;cornell.toml: rendering · glimt\x1b\\\x1b]9;4;3;0\x1b\\";
-        assert_eq!(sent(&mut chrome, &ui, false), busy);
+        assert_eq!(sent(&mut shown_title, &ui, false), busy);
         ui.worker(Event::Progress { generation: 1, progress: progress(0.389, None) });
         let part = "\x1b]2;cornell.toml: rendering 38 % · glimt\x1b\\\x1b]9;4;1;38\x1b\\";
-        assert_eq!(sent(&mut chrome, &ui, false), part);
+        assert_eq!(sent(&mut shown_title, &ui, false), part);
         let coarse = "\x1b]2;cornell.toml: rendering 30 % · glimt\x1b\\\x1b]9;4;1;30\x1b\\";
-        assert_eq!(sent(&mut chrome, &ui, true), coarse);
+        assert_eq!(sent(&mut shown_title, &ui, true), coarse);
         ui.press(' ');
         let held = "\x1b]2;cornell.toml: paused 30 % · glimt\x1b\\\x1b]9;4;4;30\x1b\\";
-        assert_eq!(sent(&mut chrome, &ui, true), held);
+        assert_eq!(sent(&mut shown_title, &ui, true), held);
         ui.press(' ');
         ui.finish([200, 30, 30]);
         let done = "\x1b]2;cornell.toml: done · glimt\x1b\\\x1b]9;4;0;0\x1b\\";
-        assert_eq!(sent(&mut chrome, &ui, false), done);
-        assert_eq!(sent(&mut chrome, &ui, false), "", "nothing when nothing changes");
+        assert_eq!(sent(&mut shown_title, &ui, false), done);
+        assert_eq!(sent(&mut shown_title, &ui, false), "", "no bytes without a change");
         ui.fail(Vec::new());
         ui.event(crate::event::Event::Settled);
-        assert!(sent(&mut chrome, &ui, false).contains("\x1b]9;4;2;100\x1b\\"));
+        assert!(sent(&mut shown_title, &ui, false).contains("\x1b]9;4;2;100\x1b\\"));
     }
 
     #[test]
-    fn a_terminal_without_abilities_gets_nothing() {
-        let (mut ui, mut chrome) = (TestUi::new(), WindowTitle::default());
-        assert_eq!(ui.state.display.abilities, Capabilities::default());
+    fn unsupported_terminals_get_no_title() {
+        let (mut ui, mut shown_title) = (TestUi::new(), WindowTitle::default());
+        assert_eq!(ui.state.display.capabilities, Capabilities::default());
         ui.finish([200, 30, 30]);
-        assert_eq!(sent(&mut chrome, &ui, false), "");
+        assert_eq!(sent(&mut shown_title, &ui, false), "");
     }
 
     #[test]
-    fn names_of_files_end_no_sequence() {
+    fn control_characters_in_file_names_are_escaped() {
         let mut ui = ui();
         ui.state.request.scene = "a\x1b\\\x07b.toml".into();
         ui.finish([200, 30, 30]);

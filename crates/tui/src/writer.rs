@@ -1,5 +1,4 @@
-//! Bytes on their way to the terminal, written by a thread of their own: a terminal that takes nothing holds up that
-//! thread, never the loop.
+//! Writes to the terminal on a separate thread, so a stalled terminal never blocks the event loop.
 
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions};
@@ -17,7 +16,7 @@ use nix::unistd::ttyname;
 
 use super::event::Event;
 
-/// Bytes that wait to be written. There is one standard output, and one queue.
+/// Slices to be written. There is only one standard output, so there is one queue.
 static QUEUE: WriteQueue = WriteQueue {
     waiting: Mutex::new(PendingWrites { slices: VecDeque::new(), is_writing: false, is_given_up: false }),
     changed: Condvar::new(),
@@ -31,7 +30,7 @@ struct WriteQueue {
 struct PendingWrites {
     slices: VecDeque<Vec<u8>>,
     is_writing: bool,
-    /// Whether what the terminal does not take at once is dropped.
+    /// Whether to drop bytes that the terminal does not accept immediately.
     is_given_up: bool,
 }
 
@@ -58,10 +57,10 @@ impl WriteQueue {
     }
 }
 
-/// Starts the thread. It says of every slice that it was written, or that this is not possible, which ends it.
+/// Starts the writer thread. It reports each written slice and ends after the first error.
 ///
 /// # Errors
-/// The system has no thread or no descriptor left.
+/// The system has no thread or file descriptor left.
 pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
     let mut out = output()?;
@@ -83,19 +82,19 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// The terminal that standard output is, without a buffer and without a lock that a stuck writer could hold. Its mode does
-/// not wait, which others that have the terminal open do not notice.
+/// Opens the terminal of standard output without a buffer and without a lock that a stalled writer could
+/// hold. It is nonblocking, which does not affect other users of the terminal.
 pub(super) fn output() -> io::Result<File> {
     let stdout = io::stdout();
     let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
         let flags = OFlag::O_NONBLOCK | OFlag::O_NOCTTY;
         OpenOptions::new().write(true).custom_flags(flags.bits()).open(name)
     });
-    // A terminal without a name is written to as it is.
+    // A terminal without a name is used as is.
     terminal.or_else(|_| Ok(File::from(stdout.as_fd().try_clone_to_owned()?)))
 }
 
-/// One slice more to write.
+/// Queues a slice.
 pub(super) fn send(slice: Vec<u8>) {
     let mut waiting = QUEUE.lock();
     waiting.is_given_up = false;
@@ -104,7 +103,8 @@ pub(super) fn send(slice: Vec<u8>) {
     QUEUE.changed.notify_all();
 }
 
-/// Drops slices that have not begun, and waits for the one that has; after `patience` drops its rest as well, and returns false.
+/// Drops queued slices and waits for the one being written. After `patience`, drops its rest as well and
+/// returns false.
 pub(super) fn discard(patience: Duration) -> bool {
     let mut waiting = QUEUE.lock();
     waiting.slices.clear();
@@ -120,10 +120,10 @@ pub(super) fn discard(patience: Duration) -> bool {
     is_whole
 }
 
-/// Interval between looks at a terminal that takes nothing.
+/// Poll interval while the terminal accepts nothing.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Writes all, until it is given up.
+/// Writes all bytes unless `is_given_up` returns true.
 pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn() -> bool) -> io::Result<()> {
     while !bytes.is_empty() {
         match out.write(bytes) {
@@ -136,7 +136,7 @@ pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn()
                 }
                 let mut ends = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
                 let look = PollTimeout::try_from(LOOK).unwrap_or(PollTimeout::ZERO);
-                // An error here shows itself again in the next write.
+                // The next write reports any error.
                 let _ = poll(&mut ends, look);
             }
             Err(error) => return Err(error),

@@ -1,53 +1,53 @@
-//! Colors of the terminal, and how they show other colors.
+//! Colors of the terminal, and how other colors are shown with them.
 
-mod mix;
-mod mixture;
+mod bayer;
+mod color_mapper;
 mod oklab;
 mod palette;
-mod pattern;
-mod shades;
+mod palette_dither;
+mod recipes;
 
 use ratatui::style::Color;
 
-pub(super) use self::mixture::Mixture;
+pub(super) use self::bayer::dithered_to_6_bits;
+pub(super) use self::color_mapper::ColorMapper;
 pub(super) use self::oklab::oklab;
 pub use self::palette::in_xterm;
-pub(super) use self::palette::{Ansi, XTERM, ansi, fixed, nearest_256};
-pub(super) use self::pattern::finer;
-pub(super) use self::shades::Shades;
+pub(super) use self::palette::{AnsiColors, XTERM, ansi, fixed, nearest_256};
+pub(super) use self::palette_dither::PaletteDither;
 use super::terminals::Brand;
 use crate::choice;
 
 choice! {
     /// Choice of colors.
     pub enum ColorChoice {
-        /// What the terminal can show.
+        /// The most that the terminal supports.
         Auto = "auto",
-        /// 24 bits.
+        /// 24-bit color.
         TrueColor = "truecolor",
-        /// The palette of 256: the 6×6×6 cube and the grays of xterm.
+        /// The 256-color palette: xterm's 6×6×6 cube and grays.
         Indexed256 = "256",
-        /// The palette of 16 of xterm.
+        /// The 16-color palette of xterm.
         Ansi16 = "16",
-        /// None.
+        /// No colors.
         None = "none",
     }
 }
 
-/// Colors that the terminal gets.
+/// Color depth of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColorDepth {
-    /// 24 bits.
+    /// 24-bit color.
     TrueColor,
-    /// The 6×6×6 cube and the grays of xterm.
+    /// xterm's 6×6×6 cube and grays.
     Indexed256,
     /// The 16 colors of xterm.
     Ansi16,
-    /// None at all.
+    /// No colors.
     None,
 }
 
-/// The depth for a choice, in an environment.
+/// Color depth for a choice in an environment.
 pub(super) fn depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     match choice {
         ColorChoice::TrueColor => ColorDepth::TrueColor,
@@ -58,15 +58,15 @@ pub(super) fn depth(choice: ColorChoice, variable: impl Fn(&str) -> Option<Strin
     }
 }
 
-/// `NO_COLOR` first (no-color.org), then `COLORTERM`, then the names in `TERM` and `TERM_PROGRAM`: SSH often
-/// forwards `TERM` only.
+/// Detects the color depth from `NO_COLOR` (no-color.org), `COLORTERM`, `TERM` and `TERM_PROGRAM`, in this
+/// order. SSH often forwards only `TERM`.
 fn detected(variable: impl Fn(&str) -> Option<String>) -> ColorDepth {
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     if !get("NO_COLOR").is_empty() || has_no_colors(&term) {
         return ColorDepth::None;
     }
-    // GNU screen passes COLORTERM of the terminal around it on and does not know 24 bits itself.
+    // GNU screen passes on COLORTERM of the outer terminal, but does not support 24-bit color itself.
     let in_screen = term.starts_with("screen") && get("TMUX").is_empty();
     let says_true = matches!(get("COLORTERM").as_str(), "truecolor" | "24bit");
     if in_screen {
@@ -86,19 +86,19 @@ fn has_no_colors(term: &str) -> bool {
 
 fn is_true_color(term: &str, program: &str) -> bool {
     const TERMS: [&str; 8] = ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
-    // Inside tmux TERM_PROGRAM is `tmux`, so that what the outer terminal can do does not leak in.
+    // Inside tmux, TERM_PROGRAM is `tmux`, so the outer terminal's capabilities do not leak in.
     term.ends_with("-direct")
         || TERMS.iter().any(|name| term.contains(name))
         || Brand::of_program(program).is_some_and(Brand::has_colors_and_repeats)
 }
 
-/// Whether the environment says that the terminal's background is light: rxvt's `COLORFGBG`, which some others set as well.
+/// Whether `COLORFGBG` (set by rxvt and some others) indicates a light background.
 pub(super) fn has_light_background(variable: impl Fn(&str) -> Option<String>) -> bool {
     let last = variable("COLORFGBG").and_then(|colors| colors.rsplit(';').next()?.parse::<u8>().ok());
     last.is_some_and(|index| index == 7 || (9..16).contains(&index))
 }
 
-/// The names of the 16 colors.
+/// Names of the 16 colors.
 const NAMES: [Color; 16] = [
     Color::Black,
     Color::Red,
@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_environment_decides() {
+    fn color_depth_follows_the_environment() {
         assert_eq!(auto(&[("TERM", "xterm-256color")]), ColorDepth::Indexed256);
         assert_eq!(auto(&[("TERM", "xterm-256color"), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
         assert_eq!(auto(&[("TERM", "xterm-kitty")]), ColorDepth::TrueColor);
@@ -144,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn backgrounds_are_dark_unless_said_otherwise() {
+    fn backgrounds_are_assumed_dark() {
         let light = |colors: Option<&str>| has_light_background(|_| colors.map(str::to_owned));
         assert!(light(Some("0;15")) && light(Some("0;default;7")));
         assert!(!light(Some("15;0")) && !light(Some("15;8")) && !light(Some("15;default")) && !light(None));
     }
 
     #[test]
-    fn no_color_counts_unless_empty_and_the_option_beats_it() {
+    fn no_color_is_honored_unless_overridden() {
         assert_eq!(auto(&[("NO_COLOR", "1"), ("COLORTERM", "truecolor")]), ColorDepth::None);
         assert_eq!(auto(&[("NO_COLOR", ""), ("COLORTERM", "truecolor")]), ColorDepth::TrueColor);
         assert_eq!(depth(ColorChoice::Ansi16, |_| Some("1".to_owned())), ColorDepth::Ansi16);

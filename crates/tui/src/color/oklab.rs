@@ -1,15 +1,15 @@
-//! Oklab (Björn Ottosson, "A perceptual color space for image processing", 2020): distances are about as large as they
-//! look.
+//! Oklab (Björn Ottosson, "A perceptual color space for image processing", 2020), in which distances are
+//! roughly perceptual.
 
 use crate::math::Vec3;
 
-/// The response of the three kinds of cones to linear Rec. 709 RGB.
+/// Cone responses to linear Rec. 709 RGB.
 const CONES: [Vec3; 3] = [
     Vec3::new(0.412_221_46, 0.536_332_55, 0.051_445_995),
     Vec3::new(0.211_903_5, 0.680_699_5, 0.107_396_96),
     Vec3::new(0.088_302_46, 0.281_718_85, 0.629_978_7),
 ];
-/// Lightness, red over green, yellow over blue of the cube roots of those.
+/// Lightness, green–red and blue–yellow from the cube roots of the cone responses.
 const LAB: [Vec3; 3] = [
     Vec3::new(0.210_454_26, 0.793_617_8, -0.004_072_047),
     Vec3::new(1.977_998_5, -2.428_592_2, 0.450_593_7),
@@ -26,12 +26,13 @@ pub(crate) fn oklab(linear: Vec3) -> Vec3 {
     product(LAB, Vec3::from_array(cones.to_array().map(f32::cbrt)))
 }
 
-/// Derivative of Oklab by linear light, around a color. In the dark the derivative has no bound, and a smaller one is assumed.
+/// Derivative of Oklab with respect to linear light at a color. It is bounded artificially in the dark, where
+/// it would diverge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OklabDerivative(Vec3);
 
 impl OklabDerivative {
-    /// Around this linear color.
+    /// The derivative at a linear color.
     pub(super) fn at(linear: Vec3) -> Self {
         const DARK: f32 = 0.01;
         let cones = product(CONES, linear.max(Vec3::ZERO));
@@ -41,7 +42,7 @@ impl OklabDerivative {
         })))
     }
 
-    /// The change of Oklab for a change of linear light.
+    /// Change of Oklab for a small change in linear light.
     pub(super) fn change(self, linear: Vec3) -> Vec3 {
         product(LAB, self.0 * product(CONES, linear))
     }
@@ -52,14 +53,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn white_is_lightness_one_without_hue() {
+    fn white_has_lightness_one_and_no_hue() {
         assert!(oklab(Vec3::ONE).distance(Vec3::new(1.0, 0.0, 0.0)) < 1e-3);
-        // Ottosson's table: the Y axis of XYZ is close to pure green of this space; red's lightness is 0.628.
+        // Lightness of red from Ottosson's article.
         assert!((oklab(Vec3::X).x - 0.628).abs() < 1e-3);
     }
 
     #[test]
-    fn the_slope_is_the_limit_of_differences() {
+    fn derivative_matches_finite_differences() {
         let color = Vec3::new(0.4, 0.2, 0.6);
         let step = Vec3::new(1e-3, -2e-3, 1e-3);
         let change = oklab(color + step) - oklab(color);

@@ -1,20 +1,20 @@
-//! The colors of the palettes: 16 of the terminal's own, and xterm's cube and grays.
+//! Terminal palettes: the 16 ANSI colors, and xterm's cube and grays.
 
 use ratatui::style::Color;
 
-/// The levels of a channel in the 6×6×6 cube.
+/// Channel levels of the 6×6×6 cube.
 pub(crate) const CUBE_LEVELS: [u8; 6] = [0, 95, 135, 175, 215, 255];
 
-/// First of the colors that are the same everywhere: a cube.
+/// First color that is the same in all terminals (start of the cube).
 pub(crate) const FIRST_FIXED: u8 = 16;
 /// First gray.
-pub(crate) const FIRST_GREY: u8 = 232;
+pub(crate) const FIRST_GRAY: u8 = 232;
 
-/// The 16 colors of a terminal, in sRGB.
-pub(crate) type Ansi = [[u8; 3]; 16];
+/// The 16 ANSI colors in sRGB.
+pub(crate) type AnsiColors = [[u8; 3]; 16];
 
-/// The 16 colors as xterm draws them by default; people change them.
-pub(crate) const XTERM: Ansi = [
+/// xterm's default ANSI colors, which users often change.
+pub(crate) const XTERM: AnsiColors = [
     [0, 0, 0],
     [205, 0, 0],
     [0, 205, 0],
@@ -33,8 +33,8 @@ pub(crate) const XTERM: Ansi = [
     [255, 255, 255],
 ];
 
-/// The 16 colors of the Linux console, which are those of the VGA.
-const VGA: Ansi = [
+/// The ANSI colors of the Linux console (VGA).
+const VGA: AnsiColors = [
     [0, 0, 0],
     [170, 0, 0],
     [0, 170, 0],
@@ -53,24 +53,24 @@ const VGA: Ansi = [
     [255, 255, 255],
 ];
 
-/// The likely 16 colors of a terminal that has not reported its own.
-pub(crate) fn ansi(term: &str) -> &'static Ansi {
+/// Likely ANSI colors of a terminal that has not reported them.
+pub(crate) fn ansi(term: &str) -> &'static AnsiColors {
     if term.starts_with("linux") { &VGA } else { &XTERM }
 }
 
-/// sRGB values of a palette color. `None` for the first 16, which are the user's.
+/// The sRGB value of a palette color. `None` for the first 16, which the user can change.
 pub(crate) fn fixed(index: u8) -> Option<[u8; 3]> {
     match index {
         0..FIRST_FIXED => None,
-        FIRST_FIXED..FIRST_GREY => {
+        FIRST_FIXED..FIRST_GRAY => {
             let i = usize::from(index - FIRST_FIXED);
             Some([i / 36, i / 6 % 6, i % 6].map(|step| CUBE_LEVELS[step]))
         }
-        FIRST_GREY.. => Some([8 + 10 * (index - FIRST_GREY); 3]),
+        FIRST_GRAY.. => Some([8 + 10 * (index - FIRST_GRAY); 3]),
     }
 }
 
-/// sRGB values of a color in xterm by default. `None` for the terminal's own color.
+/// The sRGB value of a color with xterm's defaults. `None` for the default color.
 pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
     let ansi = match color {
         Color::Reset => return None,
@@ -96,7 +96,7 @@ pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
     Some(XTERM[ansi])
 }
 
-/// The nearer of the nearest color of the cube (16 to 231) and the nearest gray (232 to 255).
+/// The nearest palette color from the cube (16 to 231) and the grays (232 to 255).
 pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
     let steps = rgb.map(nearest_level);
     let cube = steps.map(|step| CUBE_LEVELS[step]);
@@ -105,7 +105,7 @@ pub(crate) fn nearest_256(rgb: [u8; 3]) -> u8 {
     let gray_step = u8::try_from(gray_step.min(23)).unwrap_or(23);
     let gray = [8 + 10 * gray_step; 3];
     if difference(rgb, gray) < difference(rgb, cube) {
-        FIRST_GREY + gray_step
+        FIRST_GRAY + gray_step
     } else {
         let index = 36 * steps[0] + 6 * steps[1] + steps[2];
         FIRST_FIXED + u8::try_from(index).unwrap_or(215)
@@ -120,8 +120,7 @@ fn nearest_level(channel: u8) -> usize {
     }
 }
 
-/// A weighted distance in sRGB that follows the eye well at the cost of a few products ("redmean",
-/// compuphase.com/cmetric.htm), squared.
+/// Squared "redmean" distance in sRGB (compuphase.com/cmetric.htm), a cheap perceptual approximation.
 fn difference(a: [u8; 3], b: [u8; 3]) -> i32 {
     let [dr, dg, db] = std::array::from_fn(|i| i32::from(a[i]) - i32::from(b[i]));
     let mean_red = (i32::from(a[0]) + i32::from(b[0])) / 2;
@@ -133,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_indices_of_256() {
+    fn known_256_color_indices() {
         for (rgb, index) in [
             ([0, 0, 0], 16),
             ([255, 255, 255], 231),
@@ -154,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn no_other_index_of_256_is_much_nearer() {
+    fn no_256_color_index_is_much_nearer() {
         let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed).collect();
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {

@@ -1,13 +1,13 @@
-//! Pace by time: bytes that fill up at a steady rate, a bucketful at most.
+//! A token bucket for pacing by time.
 
 use std::time::{Duration, Instant};
 
-/// Below a line of 1 Mbit/s, 125 kB a second, so that its queue drains.
+/// Less than 1 Mbit/s (125 kB/s), so that the queue of such a connection drains.
 pub(super) const RATE: f64 = 100_000.0;
-/// Most tokens: 100 ms of that line.
+/// Capacity: 100 ms at that bandwidth.
 const FULL: f64 = 12_000.0;
 
-/// The bytes that may be sent.
+/// A bucket whose tokens are bytes.
 #[derive(Debug)]
 pub(super) struct TokenBucket {
     tokens: f64,
@@ -28,12 +28,12 @@ impl TokenBucket {
         (self.tokens, self.at) = (self.level(now) - bytes as f64, now);
     }
 
-    /// When there are so many.
+    /// Time at which there are enough tokens for `bytes`.
     pub(super) fn when(&self, bytes: usize, now: Instant) -> Instant {
         if self.tokens(now) >= bytes {
             return now;
         }
-        // One more, so that rounding leaves enough.
+        // One extra byte, so that rounding leaves enough.
         let missing = (bytes + 1) as f64 - self.level(now);
         now + Duration::from_secs_f64(missing / RATE)
     }

@@ -2,7 +2,7 @@
 
 const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// The bytes in base64, padded.
+/// Encodes bytes in padded base64.
 pub(crate) fn encoded(bytes: &[u8]) -> Vec<u8> {
     let mut text = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
     for group in bytes.chunks(3) {
@@ -17,7 +17,7 @@ pub(crate) fn encoded(bytes: &[u8]) -> Vec<u8> {
     text
 }
 
-/// The bytes that a text in base64 stands for; digits of no value are passed over.
+/// Decodes base64, ignoring invalid digits.
 pub(super) fn decoded(text: &[u8]) -> Vec<u8> {
     let values = text.iter().filter_map(|digit| DIGITS.iter().position(|known| known == digit));
     let (mut bytes, mut bits, mut count) = (Vec::with_capacity(text.len() / 4 * 3), 0_u32, 0);
@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_examples_of_the_rfc() {
+    fn rfc_4648_examples() {
         for (bytes, text) in [
             ("", ""),
             ("f", "Zg=="),

@@ -1,4 +1,4 @@
-//! kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): PNG in chunks of base64.
+//! kitty's graphics protocol (sw.kovidgoyal.net/kitty/graphics-protocol): PNG in base64 chunks.
 
 use ratatui::layout::Rect;
 
@@ -6,12 +6,12 @@ use super::base64::encoded;
 use super::png::png;
 use crate::film::Picture;
 
-/// The two images that take turns. Numbers that others are not likely to use.
+/// IDs of the two alternating images, unlikely to be used by other programs.
 const IDS: [u32; 2] = [0x67_6c_69, 0x6d_74_01];
-/// The longest chunk.
+/// Maximum length of a chunk.
 const CHUNK: usize = 4096;
 
-/// The commands that send a picture and show it at the cursor over these cells; after that the other one is deleted.
+/// The commands that show an image at the cursor over these cells and then delete the previous one.
 pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>> {
     let [id, other] = if turn { IDS } else { [IDS[1], IDS[0]] };
     let data = encoded(&png(picture));
@@ -19,7 +19,7 @@ pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>>
     let mut commands = Vec::with_capacity(count);
     for (i, chunk) in data.chunks(CHUNK).enumerate() {
         let more = u8::from(i + 1 < count);
-        // Placed without moving the cursor, and without an answer.
+        // Do not move the cursor and do not send a reply.
         let keys = if i == 0 {
             format!("a=T,f=100,i={id},p=1,c={},r={},C=1,q=2,m={more}", cells.width, cells.height)
         } else {
@@ -33,12 +33,12 @@ pub(super) fn encode(picture: &Picture, cells: Rect, turn: bool) -> Vec<Vec<u8>>
     commands
 }
 
-/// The command that deletes an image, its data included.
+/// The command that deletes an image and its data.
 fn delete(id: u32) -> Vec<u8> {
     format!("\x1b_Ga=d,d=I,i={id},q=2\x1b\\").into_bytes()
 }
 
-/// The commands that delete all that was shown.
+/// The commands that delete both images.
 pub(crate) fn delete_all() -> Vec<u8> {
     IDS.map(delete).concat()
 }

@@ -1,7 +1,8 @@
-//! The picture in pixels, where the terminal has a protocol for it.
+//! The preview in pixels, for terminals with an image protocol.
 //!
-//! A picture is one large update: the next one is encoded when the one before has gone out, and then it is the newest.
-//! It goes out in pieces that other bytes may come between, through the flow control of all others.
+//! An image is one large update. The next one is encoded only when the previous one has been sent, so it is
+//! always the newest. Images are sent in pieces that are subject to flow control, and other output may be
+//! sent in between.
 
 pub(super) mod base64;
 mod iterm;
@@ -22,18 +23,18 @@ use crate::film::Picture;
 pub(super) use self::kitty::delete_all;
 pub use self::pixel_screen::PixelScreen;
 
-/// Protocols for pixels.
+/// Image protocols.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Protocol {
-    /// kitty's: kitty, Ghostty, Konsole, WezTerm.
+    /// kitty's protocol: kitty, Ghostty, Konsole, WezTerm.
     Kitty,
-    /// DEC's: foot, xterm with `-ti vt340`, mlterm, tmux.
+    /// DEC's sixels: foot, xterm with `-ti vt340`, mlterm, tmux.
     Sixel,
-    /// iTerm2's, for the terminals that [`Brand`](super::terminals::Brand) tells.
+    /// iTerm2's protocol; see [`Brand`](super::terminals::Brand) for its terminals.
     Iterm,
 }
 
-/// A picture in its place.
+/// An image and the cells that it covers.
 #[derive(Clone, Debug)]
 pub(super) struct PixelPlacement {
     pub(super) picture: Arc<Picture>,
@@ -48,35 +49,36 @@ impl PartialEq for PixelPlacement {
     }
 }
 
-/// Bytes that a pixel takes, about: noise hardly shrinks.
+/// Approximate bytes per pixel; noise hardly compresses.
 const PIXEL_BYTES: f64 = 2.0;
-/// The largest picture. What passes through tmux must stay below a megabyte.
+/// Maximum size of an image. tmux passes on less than a megabyte.
 const MOST_BYTES: f64 = 600_000.0;
-/// Longest time on the way, of a picture that others follow and of one that stays.
+/// Maximum time to send an intermediate and a final image.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
 
-/// The pictures on the screen and on their way.
+/// The images on the screen and in flight.
 #[derive(Debug)]
 pub(super) struct Images {
     protocol: Protocol,
-    /// Inside tmux, which passes on what is wrapped.
+    /// Whether sequences are wrapped for tmux.
     is_wrapped: bool,
     wanted: Option<PixelPlacement>,
-    /// The picture on the screen once all pieces have arrived.
+    /// The image on the screen once all pieces have arrived.
     shown: Option<PixelPlacement>,
     is_still: bool,
-    /// Whether what is shown was made coarser than the picture, to be shorter.
+    /// Whether the shown image was reduced to save bytes.
     is_coarse: bool,
     pieces: VecDeque<Vec<u8>>,
-    /// Whether kitty's second image is shown: the two take turns, so that one goes when the next is there.
+    /// Whether kitty's second image is shown. The two alternate, so the old image is deleted when the new one
+    /// is visible.
     turn: bool,
-    /// Palette of the last sixels.
+    /// Palette of the last sixel image.
     palette: Option<Palette>,
 }
 
 impl Images {
-    /// None yet. `is_wrapped`: inside tmux.
+    /// No images yet. `is_wrapped` inside tmux.
     pub(super) fn new(protocol: Protocol, is_wrapped: bool) -> Self {
         // tmux draws sixels itself.
         let is_wrapped = is_wrapped && protocol != Protocol::Sixel;
@@ -93,8 +95,8 @@ impl Images {
         }
     }
 
-    /// Show this from now on; `is_still`: no other one will follow soon. What is returned is to be drawn again, since a picture no
-    /// longer lies over it.
+    /// Sets the image to show; `is_still` if it is final. Returns the cells that an image no longer covers
+    /// and that must be redrawn.
     pub(super) fn aim(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
@@ -109,19 +111,19 @@ impl Images {
         Some(shown)
     }
 
-    /// The screen has been cleared.
+    /// Records that the screen has been cleared.
     pub(super) fn forget(&mut self) {
         self.shown = None;
     }
 
-    /// Whether all that is wanted has been sent.
+    /// Whether the image has been sent completely.
     pub(super) fn is_complete(&self) -> bool {
         self.pieces.is_empty()
             && (self.wanted.is_none() || (self.shown == self.wanted && !(self.is_coarse && self.is_still)))
     }
 
-    /// Next bytes to send: at most `most`, unless a piece is longer. `None` if everything has been sent. `rate`: bytes per second
-    /// of the line, if known.
+    /// The next bytes, at most `most` unless a single piece is longer. `None` if everything has been sent.
+    /// `rate` is the bandwidth in bytes per second, if known.
     pub(super) fn slice(&mut self, most: usize, rate: Option<f64>) -> Option<Vec<u8>> {
         if self.pieces.is_empty() && !self.is_complete() {
             self.encode(rate);
@@ -164,11 +166,11 @@ impl Images {
         self.shown = Some(wanted);
     }
 
-    /// With the cursor at the top left cell; it is where it was afterwards.
+    /// Positions the cursor at the top left cell and restores it afterwards.
     fn placed(&self, cells: Rect, body: Vec<u8>) -> Vec<u8> {
         let mut bytes = format!("\x1b7\x1b[{};{}H", cells.y + 1, cells.x + 1).into_bytes();
         if self.is_wrapped {
-            // tmux moves the cursor of the terminal when it draws there: a blank, and back.
+            // tmux moves the real cursor when it draws, so print a blank there and step back.
             bytes.extend_from_slice(b"\x1b[0m ");
             bytes.extend(self.passed([b"\x1b[D".to_vec(), body].concat()));
         } else {
@@ -183,7 +185,7 @@ impl Images {
     }
 }
 
-/// Passed on by tmux, where `allow-passthrough` is on.
+/// Wraps a sequence so that tmux passes it on if `allow-passthrough` is on.
 pub(super) fn wrapped(body: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x1bPtmux;".to_vec();
     for &byte in body {

@@ -1,54 +1,54 @@
-//! A palette made from a picture: boxes of colors are split where their squared error is largest (after X. Wu, "Efficient
-//! statistical computations for optimal color quantization", 1991), and each becomes its mean.
+//! Palette quantization: color boxes are split where their squared error is largest, and each becomes its
+//! mean (after X. Wu, "Efficient statistical computations for optimal color quantization", 1991).
 //!
-//! Pictures of one render follow each other closely: the palette stays as long as it fits, or its colors would flicker.
-//! Colors between those of the palette are mixed by place, as those of other palettes are.
+//! Successive previews of a render are similar, so a palette is kept while it fits; otherwise colors would
+//! flicker. Other colors are dithered.
 
 use std::ops::Range;
 
-use crate::color::{Mixture, finer};
+use crate::color::{PaletteDither, dithered_to_6_bits};
 use crate::film::Picture;
 
-/// The most colors: registers below 16 are the terminal's own.
+/// Maximum number of colors: registers below 16 belong to the terminal.
 const MOST: usize = 240;
-/// Bits of a channel that tell colors apart when the palette is made.
+/// Bits per channel of the histogram.
 const BITS: u32 = 6;
-/// A palette stays while the root of its squared error is no larger than this many times that of a new one, and so many codes.
+/// A palette is kept while its RMS error is at most `WORSE` times that of a new one plus `ALLOWED` codes.
 const WORSE: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 
-/// The colors that a picture is shown in.
+/// The colors that show an image.
 #[derive(Debug)]
 pub(super) struct Palette {
     colors: Vec<[u8; 3]>,
-    mixture: Mixture,
+    dither: PaletteDither,
 }
 
 impl Palette {
-    /// The palette for a picture: the one before if that fits it.
+    /// The palette for an image: the previous one if it still fits.
     pub(super) fn for_picture(picture: &Picture, before: Option<Self>) -> Self {
         let mut bins = bins(picture);
         let colors = split(&mut bins);
         let fits = |palette: &Self| error(&bins, &palette.colors) <= WORSE * error(&bins, &colors) + ALLOWED;
-        before.filter(fits).unwrap_or_else(|| Self { mixture: Mixture::new(&colors), colors })
+        before.filter(fits).unwrap_or_else(|| Self { dither: PaletteDither::new(&colors), colors })
     }
 
     pub(super) fn colors(&self) -> &[[u8; 3]] {
         &self.colors
     }
 
-    /// The number of the color for each pixel.
+    /// The palette index of each pixel.
     pub(super) fn indices(&mut self, picture: &Picture) -> Vec<u8> {
         let width = picture.width.max(1) as usize;
         let mut index = |(i, rgb): (usize, &[u8; 3])| {
             let (x, y) = (i % width, i / width);
-            self.mixture.index(finer(*rgb, x, y), x, y) as u8
+            self.dither.index(dithered_to_6_bits(*rgb, x, y), x, y) as u8
         };
         picture.pixels.iter().enumerate().map(&mut index).collect()
     }
 }
 
-/// Pixels of about one color.
+/// A histogram bin.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bin {
     sum: [f32; 3],
@@ -61,7 +61,7 @@ impl Bin {
     }
 }
 
-/// The colors of a picture and how often each is there.
+/// The histogram of an image, without empty bins.
 fn bins(picture: &Picture) -> Vec<Bin> {
     let mut bins = vec![Bin::default(); 1 << (3 * BITS)];
     for rgb in &picture.pixels {
@@ -76,11 +76,11 @@ fn bins(picture: &Picture) -> Vec<Bin> {
     bins
 }
 
-/// Some bins that become one color.
+/// Bins that become one palette color.
 struct ColorBox {
     bins: Range<usize>,
     mean: [f64; 3],
-    /// The axis along which the squared error is largest, and that error.
+    /// Axis with the largest squared error, and that error.
     axis: usize,
     error: f64,
 }
@@ -96,13 +96,13 @@ impl ColorBox {
         };
         let errors: [f64; 3] = std::array::from_fn(along);
         let axis = (0..3).max_by(|a, b| errors[*a].total_cmp(&errors[*b])).unwrap_or(0);
-        // One bin cannot be split, whatever rounding makes of it.
+        // A single bin cannot be split, even if rounding gives it an error.
         let error = if bins.len() > 1 { errors[axis] } else { 0.0 };
         Self { bins, mean, axis, error }
     }
 }
 
-/// The means of boxes, of which the worst is split until there are enough or all are exact.
+/// Splits the worst box until there are enough or all are exact. Returns the mean colors of the boxes.
 fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::of(bins, 0..bins.len())];
     while boxes.len() < MOST {
@@ -112,7 +112,7 @@ fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
         let own = &mut bins[range.clone()];
         own.sort_by(|a, b| a.mean()[axis].total_cmp(&b.mean()[axis]));
         let middle = range.start + own.partition_point(|bin| bin.mean()[axis] < mean[axis]);
-        // Rounding may put all of them on one side.
+        // Rounding may put all bins on one side.
         let middle = middle.clamp(range.start + 1, range.end - 1);
         boxes.push(ColorBox::of(bins, range.start..middle));
         boxes.push(ColorBox::of(bins, middle..range.end));
@@ -120,7 +120,7 @@ fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     boxes.iter().map(|own| own.mean.map(|channel| channel.round() as u8)).collect()
 }
 
-/// The root of the mean squared distance, in codes, of the colors of a picture to the nearest of a palette.
+/// RMS distance, in codes, between the colors of an image and the nearest palette colors.
 fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
     let nearest = |mean: [f64; 3]| {
         let distance = |color: &[u8; 3]| -> f64 {
@@ -136,7 +136,7 @@ fn error(bins: &[Bin], colors: &[[u8; 3]]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A ramp of one color from dark to light, and a spot of another one.
+    /// A ramp from dark to light with a spot of another color.
     fn ramp(most: f64) -> Picture {
         let pixel = |i: u32| {
             let light = f64::from(i % 128) / 127.0 * most;
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn few_colors_are_shown_exactly_and_rare_ones_are_not_lost() {
+    fn few_colors_are_exact_and_rare_ones_kept() {
         let (red, blue) = ([255, 0, 0], [0, 0, 255]);
         let pixels = (0..4096).map(|i| if i == 77 { red } else { blue }).collect();
         let picture = Picture { width: 64, height: 64, pixels };
@@ -168,11 +168,11 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_has_no_rings() {
+    fn ramp_has_no_visible_bands() {
         let picture = ramp(255.0);
         let mut palette = Palette::for_picture(&picture, None);
         let error = mean_error(&picture, &mut palette);
-        // xterm's cube has steps of 40 codes.
+        // For comparison: xterm's cube has steps of 40 codes.
         assert!(error < 4.0, "{error}");
         let indices = palette.indices(&picture);
         let means = indices.chunks(8).map(|run| {
@@ -185,11 +185,11 @@ mod tests {
     }
 
     #[test]
-    fn a_palette_stays_while_it_fits() {
+    fn palette_is_kept_while_it_fits() {
         let first = Palette::for_picture(&ramp(255.0), None);
         let colors = first.colors().to_vec();
         let same = Palette::for_picture(&ramp(253.0), Some(first));
-        assert_eq!(same.colors(), colors, "hardly another picture");
+        assert_eq!(same.colors(), colors, "nearly the same image");
         let mut other = ramp(255.0);
         other.pixels.iter_mut().for_each(|rgb| rgb.swap(0, 2));
         assert_ne!(Palette::for_picture(&other, Some(same)).colors(), colors);

@@ -1,22 +1,22 @@
-//! Pictures in pixels as a terminal takes them, for tests and benchmarks.
+//! A minimal terminal for images in pixels, for tests and benchmarks.
 
 use super::base64::decoded;
 use crate::film::Picture;
 
-/// A terminal that takes kitty's graphics and sixels and nothing else, and shows the last whole picture.
+/// A terminal that understands only kitty's graphics and sixels, and shows the last complete image.
 #[derive(Debug, Default)]
 pub struct PixelScreen {
-    /// The string that has begun, with its introducer.
+    /// The current control string, with its introducer.
     string: Option<Vec<u8>>,
     is_escaped: bool,
-    /// Base64 of kitty's chunks so far.
+    /// Base64 data of kitty's chunks so far.
     chunks: Vec<u8>,
     shown: Option<Picture>,
     count: usize,
 }
 
 impl PixelScreen {
-    /// Takes what was written to the terminal, cut anywhere.
+    /// Processes terminal output, split anywhere.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {
             let is_escaped = std::mem::replace(&mut self.is_escaped, *byte == 0x1b);
@@ -34,12 +34,12 @@ impl PixelScreen {
         }
     }
 
-    /// The picture that is shown.
+    /// The image on the screen.
     pub fn shown(&self) -> Option<&Picture> {
         self.shown.as_ref()
     }
 
-    /// Number of pictures shown so far.
+    /// Number of images shown so far.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -56,7 +56,7 @@ impl PixelScreen {
         }
     }
 
-    /// One of kitty's commands; the picture if it is the last chunk of one.
+    /// Handles one of kitty's commands. Returns the image if this is its last chunk.
     fn chunk(&mut self, command: &[u8]) -> Option<Picture> {
         let split = command.iter().position(|byte| *byte == b';')?;
         let (keys, data) = (std::str::from_utf8(&command[..split]).ok()?, &command[split + 1..]);
@@ -68,7 +68,7 @@ impl PixelScreen {
     }
 }
 
-/// A picture of three channels from PNG.
+/// Decodes an RGB image from PNG.
 fn png(bytes: &[u8]) -> Option<Picture> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().ok()?;
     let mut data = vec![0; reader.output_buffer_size()?];
@@ -81,7 +81,7 @@ fn png(bytes: &[u8]) -> Option<Picture> {
     })
 }
 
-/// A picture from a string of sixels with its size and its palette in it.
+/// Decodes a sixel string that contains its size and palette.
 fn sixel(string: &[u8]) -> Option<Picture> {
     let start = string.iter().position(|byte| *byte == b'q')? + 1;
     let mut rest = &string[start..];
@@ -120,7 +120,7 @@ fn sixel(string: &[u8]) -> Option<Picture> {
     Some(Picture { width: width as u32, height: height as u32, pixels })
 }
 
-/// The numbers at the beginning, with semicolons between them, which are taken away.
+/// Parses and removes the semicolon-separated numbers at the start.
 fn numbers(rest: &mut &[u8]) -> Vec<usize> {
     let end = rest.iter().position(|byte| !matches!(byte, b'0'..=b'9' | b';')).unwrap_or(rest.len());
     let (text, after) = rest.split_at(end);

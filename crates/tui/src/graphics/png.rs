@@ -1,8 +1,8 @@
-//! Pictures as PNG, for the protocols that take it.
+//! PNG encoding for the protocols that use it.
 
 use crate::film::Picture;
 
-/// The picture as PNG, encoded quickly; empty if that fails.
+/// Encodes an image as PNG with fast compression; empty on failure.
 pub(super) fn png(picture: &Picture) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = ::png::Encoder::new(&mut bytes, picture.width, picture.height);

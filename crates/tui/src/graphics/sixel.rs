@@ -1,4 +1,5 @@
-//! Sixels (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one color after the other.
+//! Sixels (DEC, "VT330/VT340 Programmer Reference Manual", chapter 14): columns of six pixels, one color at a
+//! time.
 
 use ratatui::layout::Rect;
 
@@ -6,14 +7,14 @@ use super::palette::Palette;
 use crate::film::Picture;
 use crate::rescale::resized;
 
-/// The register of the first color: those below are the terminal's own.
+/// Register of the first palette color; lower ones belong to the terminal.
 const FIRST: u8 = 16;
-/// Registers.
+/// Number of registers.
 const REGISTERS: usize = 256;
 
-/// The commands that show a picture at the cursor over these cells of so many pixels. The colors are those of a palette made
-/// from it, or from one before that it resembles. A picture that has fewer pixels is drawn by larger ones: colors are chosen, and
-/// memory is taken, for those that it has.
+/// The commands that show an image at the cursor over these cells of `cell` pixels. The palette is made from
+/// the image, or kept if it still fits. An image with fewer pixels is enlarged after its colors have been
+/// chosen, so time and memory depend on its own size.
 pub(super) fn encode(
     picture: &Picture,
     cells: Rect,
@@ -51,10 +52,10 @@ pub(super) fn encode(
     bytes
 }
 
-/// Six rows: for each color its sixels.
+/// Six pixel rows, with separate sixels for each color.
 struct Band {
     width: usize,
-    /// Sixels of all registers, one register after the other.
+    /// Sixels of all registers, one register after another.
     sixels: Vec<u8>,
     is_used: [bool; REGISTERS],
 }
@@ -64,7 +65,7 @@ impl Band {
         Self { width, sixels: vec![0; REGISTERS * width], is_used: [false; REGISTERS] }
     }
 
-    /// Sets a row of the six.
+    /// Sets one of the six rows.
     fn set_row(&mut self, y: u32, registers: impl Iterator<Item = u8>) {
         for (x, register) in registers.enumerate() {
             self.is_used[usize::from(register)] = true;
@@ -72,7 +73,8 @@ impl Band {
         }
     }
 
-    /// Appends the sixels of each color in these rows, back to the left after each, and at last down; the next rows are empty.
+    /// Appends the sixels of each color with a carriage return after each, then a line feed, and clears the
+    /// band.
     fn push(&mut self, bytes: &mut Vec<u8>) {
         for register in (0..REGISTERS).filter(|register| std::mem::take(&mut self.is_used[*register])) {
             bytes.extend(format!("#{register}").into_bytes());
@@ -85,7 +87,7 @@ impl Band {
     }
 }
 
-/// Sixels, with a count where many are alike; nothing for empty ones at the end.
+/// Appends run-length encoded sixels without trailing empty ones.
 fn push_runs(sixels: impl Iterator<Item = u8>, bytes: &mut Vec<u8>) {
     let mut push = |sixel: u8, count: usize| match count {
         0..4 => bytes.extend(std::iter::repeat_n(sixel, count)),
@@ -109,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_counted_and_the_end_is_left_out() {
+    fn runs_are_encoded_and_trailing_blanks_omitted() {
         let mut bytes = Vec::new();
         push_runs(b"???@@@@@~~A????".iter().copied(), &mut bytes);
         assert_eq!(String::from_utf8(bytes).expect("ASCII"), "???!5@~~A");

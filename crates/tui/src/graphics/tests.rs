@@ -17,26 +17,26 @@ fn all(images: &mut Images) -> String {
 }
 
 #[test]
-fn a_picture_is_sent_once_and_the_newest_after_it() {
+fn pending_images_are_replaced_by_the_newest() {
     let mut images = Images::new(Protocol::Kitty, false);
     assert!(images.is_complete() && images.slice(5000, None).is_none());
     let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
     images.aim(Some(first), false);
     let begin = String::from_utf8(images.slice(100, None).expect("a piece")).expect("ASCII");
     assert!(begin.starts_with("\x1b_Ga=T,f=100,i=6777961,p=1,c=8,r=3,C=1,q=2,m=1;"), "{begin}");
-    // While it is on its way the next ones come; the last of them follows it.
+    // More images arrive while it is being sent; only the last one follows.
     images.aim(Some(second), false);
     images.aim(Some(third.clone()), true);
     let rest = all(&mut images);
     assert_eq!(rest.matches("a=T").count(), 1);
-    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "each is shown at its place by its last chunk");
+    assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "the last chunk of each shows it");
     assert!(images.is_complete());
     images.aim(Some(third), true);
     assert_eq!(all(&mut images), "");
 }
 
 #[test]
-fn chunks_of_kitty_are_short_and_the_other_image_is_deleted() {
+fn kitty_chunks_are_short_and_images_alternate() {
     let mut images = Images::new(Protocol::Kitty, false);
     images.aim(Some(placement(1, 2)), true);
     let first = all(&mut images);
@@ -51,12 +51,12 @@ fn chunks_of_kitty_are_short_and_the_other_image_is_deleted() {
 }
 
 #[test]
-fn a_picture_that_moves_or_goes_uncovers_its_cells() {
+fn moved_image_uncovers_its_cells() {
     for protocol in [Protocol::Kitty, Protocol::Sixel, Protocol::Iterm] {
         let mut images = Images::new(protocol, false);
         assert_eq!(images.aim(Some(placement(1, 2)), true), None);
         all(&mut images);
-        assert_eq!(images.aim(Some(placement(2, 2)), true), None, "another one in its place");
+        assert_eq!(images.aim(Some(placement(2, 2)), true), None, "a new image at the same position");
         all(&mut images);
         assert_eq!(images.aim(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
         all(&mut images);
@@ -67,21 +67,21 @@ fn a_picture_that_moves_or_goes_uncovers_its_cells() {
 }
 
 #[test]
-fn slow_lines_get_coarser_pictures_until_one_stays() {
+fn slow_connections_get_coarser_images() {
     let mut images = Images::new(Protocol::Iterm, false);
     let picture = placement(1, 2);
     images.aim(Some(picture.clone()), false);
     let coarse = images.slice(5000, Some(1000.0)).expect("a picture").len();
     assert!(images.is_complete());
     images.aim(Some(picture), true);
-    assert!(!images.is_complete(), "it stays, and may take longer");
+    assert!(!images.is_complete(), "a final image may take longer");
     let fine = images.slice(5000, Some(10_000.0)).expect("a picture").len();
     assert!(coarse * 4 < fine, "{coarse} {fine}");
     assert!(images.is_complete());
 }
 
 #[test]
-fn tmux_passes_on_what_is_wrapped() {
+fn tmux_sequences_are_wrapped() {
     assert_eq!(wrapped(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
     let mut images = Images::new(Protocol::Iterm, true);
     images.aim(Some(placement(1, 2)), true);
@@ -94,7 +94,7 @@ fn tmux_passes_on_what_is_wrapped() {
 }
 
 #[test]
-fn sixels_have_the_size_of_their_cells_and_their_colors() {
+fn sixels_match_size_and_colors() {
     let mut placed = placement(0, 0);
     let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
     placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });
@@ -108,10 +108,10 @@ fn sixels_have_the_size_of_their_cells_and_their_colors() {
 }
 
 #[test]
-fn pictures_of_other_sizes_fill_the_cells_in_sixels() {
-    // Levels that are not mixed: of 63.
+fn sixel_images_are_resized_to_their_cells() {
+    // Levels that need no dithering to 63 steps.
     let color = |x: u32, y: u32| [(85 * x) as u8, (85 * y) as u8, 255 * ((x + y) % 2) as u8];
-    // 64 × 48 pixels in the window: of a picture's 4 × 3 pixels each becomes 16 × 16, of 640 × 480 each 10 × 10 become one.
+    // The window has 64 × 48 pixels, so the images are scaled by 16 and by 1/10.
     for (width, height) in [(4, 3), (640, 480)] {
         let pixels = (0..width * height).map(|i| color(i % width * 4 / width, i / width * 3 / height));
         let mut placed = placement(0, 0);
@@ -124,7 +124,7 @@ fn pictures_of_other_sizes_fill_the_cells_in_sixels() {
         assert_eq!((shown.width, shown.height), (64, 48));
         for (i, pixel) in (0..).zip(&shown.pixels) {
             let expected = color(i % 64 / 16, i / 64 / 16);
-            // Levels of sixels are percents.
+            // Sixel levels are percentages.
             let off = pixel.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max();
             assert!(off <= Some(2), "{width}×{height}, pixel {i}: {pixel:?} {expected:?}");
         }

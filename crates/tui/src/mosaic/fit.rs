@@ -1,24 +1,24 @@
-//! The best two colors and the best pattern for the pixels of a cell.
+//! Fits two colors and a block character to the pixels of a cell.
 
 use super::tile::{CellDivision, Grid, Tile};
 use crate::color::oklab;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb8, srgb8_to_linear};
 
-/// A cell of two colors, in sRGB.
+/// A cell of two colors in sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct FittedCell {
     pub(crate) tile: Tile,
-    /// Colors of the first and of the second part.
+    /// Colors of the first and the second part.
     pub(crate) pair: [[u8; 3]; 2],
 }
 
-/// A division other than halves has to save so much of the mean squared distance in Oklab: less is not seen, would turn with the
-/// noise, and takes more bytes.
+/// A tile other than halves must reduce the mean squared distance in Oklab by at least this. Less is not
+/// visible, would flicker with the noise, and takes more bytes.
 const WORTH: f32 = 1e-4;
 
-/// The cell with the least squared distance in Oklab from these colors, in sRGB, of its pixels from the top left one along
-/// the rows: of all ways to divide them the one with the smallest variance within the two parts.
+/// The cell with the least squared distance in Oklab from its pixels. `pixels` are sRGB colors in row order.
+/// Of all divisions, this is the one with the smallest variance within its two parts.
 pub(crate) fn fit(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     if let ([first, second], Grid::Halves) = (pixels, grid) {
         return FittedCell { tile: Tile::HALVES, pair: [*first, *second] };
@@ -33,7 +33,7 @@ pub(crate) fn fit(grid: Grid, pixels: &[[u8; 3]]) -> FittedCell {
     FittedCell { tile, pair: [mean(true), mean(false)] }
 }
 
-/// The best division.
+/// The best division of a cell.
 fn division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
     let count = pixels.len() as f32;
     let labs: Vec<Vec3> = pixels.iter().map(|pixel| oklab(*pixel)).collect();
@@ -50,7 +50,7 @@ fn division(grid: Grid, pixels: &[Vec3]) -> CellDivision {
             size += sign;
         }
         mask = division.first;
-        // What the variance is less.
+        // Reduction of the variance.
         let gain = sum.length_squared() / size + (all - sum).length_squared() / (count - size).max(1.0);
         let worth = if division.tile == Tile::HALVES { WORTH * count } else { 0.0 };
         if gain + worth > most {
@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_colors_are_found_whatever_their_pattern() {
+    fn two_color_patterns_are_found() {
         let colors = [[200, 20, 20], [20, 40, 180]];
         for grid in [Grid::Quadrants, Grid::Sextants, Grid::Octants] {
             for CellDivision { first, tile } in grid.divisions() {
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_nearly_of_one_color_is_in_halves() {
+    fn nearly_uniform_cells_use_halves() {
         let pixels: Vec<[u8; 3]> = (0..4).map(|i| [150 + i % 3; 3]).collect();
         assert_eq!(fit(Grid::Quadrants, &pixels).tile, Tile::HALVES);
     }

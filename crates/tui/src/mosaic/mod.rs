@@ -1,4 +1,4 @@
-//! Cells of two colors: the characters that divide a cell, and the best of them for some pixels.
+//! Cells of two colors: block characters, and fitting them to pixels.
 
 mod fit;
 mod tile;

@@ -1,18 +1,21 @@
-//! Characters that fill a part of their cell by the foreground: blocks, quadrants, sextants, octants, shades.
+//! Block characters that fill part of their cell with the foreground: blocks, quadrants, sextants, octants
+//! and shades.
 
 use std::collections::HashMap;
 use std::sync::LazyLock;
 
-/// Rows of the grid of a cell's parts: enough for halves, thirds and quarters. The grid has two columns.
+/// Rows of the grid that describes parts of a cell, divisible into halves, thirds and quarters. It has two
+/// columns.
 pub(crate) const GRID_ROWS: u32 = 12;
-/// Places of the grid.
+/// Number of squares in the grid.
 pub(crate) const PLACES: u32 = 2 * GRID_ROWS;
 const ALL: u32 = (1 << PLACES) - 1;
 
-/// Two parts of a cell and the characters that tell them apart. The first part has the top left corner.
+/// A division of a cell into two parts, and the characters that show it. The first part contains the top left
+/// corner.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tile {
-    /// The places of the first part, from the top left one along the rows.
+    /// Mask of the squares of the first part, in row order.
     first: u32,
     symbols: [char; 2],
 }
@@ -26,36 +29,36 @@ impl PartialEq for Tile {
 impl Eq for Tile {}
 
 impl Tile {
-    /// The upper and the lower half.
+    /// Upper and lower half.
     pub(crate) const HALVES: Self = Self { first: (1 << GRID_ROWS) - 1, symbols: ['▀', '▄'] };
-    /// A quarter of the foreground in the background. What is in between is drawn by each font in its own way.
+    /// A quarter of the cell in the foreground color. Fonts draw the pattern in different ways.
     pub(crate) const LIGHT: Self = Self { first: 0x21_21_21, symbols: ['░', '▓'] };
 
-    /// Half of one and half of the other color, finely mixed.
+    /// A fine pattern of equal shares of both colors.
     pub(crate) const MEDIUM: Self = Self { first: CHECKS, symbols: ['▒', '▒'] };
 
-    /// The characters that show the first and the second part by the foreground.
+    /// The characters whose foreground is the first and the second part.
     pub(crate) fn symbols(self) -> [char; 2] {
         self.symbols
     }
 
-    /// Number of places in each part.
+    /// Number of squares in each part.
     pub(crate) fn sizes(self) -> [u32; 2] {
         let first = self.first.count_ones();
         [first, PLACES - first]
     }
 
-    /// Number of places that each part of this tile shares with each part of the other.
+    /// Number of squares that each part of this tile shares with each part of the other.
     pub(crate) fn shared(self, other: Self) -> [[u32; 2]; 2] {
         let parts = |tile: Self| [tile.first, ALL & !tile.first];
         parts(self).map(|own| parts(other).map(|its| (own & its).count_ones()))
     }
 }
 
-/// The tile that a character fills with the foreground, and whether the foreground is its second part. `None` for a character
-/// without blocks.
+/// The tile of a character, and whether its foreground is the second part. `None` for other than block
+/// characters.
 pub(crate) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
-    // All others are letters, digits, signs.
+    // Block elements and legacy computing symbols come after all letters, digits and punctuation.
     if symbol < '▀' {
         return None;
     }
@@ -63,8 +66,8 @@ pub(crate) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
     of_mask(*mask)
 }
 
-/// The places of a cell that a character fills with the foreground: 2 columns and 12 rows, from the top left one along the rows.
-/// `None` for a character without blocks.
+/// The squares of a cell that a character fills with the foreground, as 12 rows of 2 columns. `None` for
+/// other than block characters.
 pub fn filled(symbol: char) -> Option<[bool; 24]> {
     let mask = match symbol {
         ' ' => 0,
@@ -74,7 +77,7 @@ pub fn filled(symbol: char) -> Option<[bool; 24]> {
     Some(std::array::from_fn(|place| mask >> place & 1 == 1))
 }
 
-/// The tile with these places in its first part, or in its second if they leave out the top left corner.
+/// The tile with this mask as its first part, or as its second part if the top left corner is not in it.
 fn of_mask(mask: u32) -> Option<(Tile, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
@@ -83,7 +86,7 @@ fn of_mask(mask: u32) -> Option<(Tile, bool)> {
     Some((tile, is_second))
 }
 
-/// Characters and the places that they fill.
+/// Characters and the squares that they fill.
 struct TileTable {
     masks: HashMap<char, u32>,
     symbols: HashMap<u32, char>,
@@ -103,7 +106,7 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     let light = Tile::LIGHT.first;
     add('░', light);
     add('▓', ALL & !light);
-    // Turned round it is another one in the grid and the same on the screen.
+    // Inverted, it is a different mask but looks the same.
     for mask in [CHECKS, ALL & !CHECKS] {
         add('▒', mask);
     }
@@ -126,18 +129,18 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     table
 });
 
-/// Every other place.
+/// Checkerboard.
 const CHECKS: u32 = 0x99_99_99;
 
-/// Characters by the places that they fill, in a grid of two columns and two rows, lowest bit first (Unicode, "Block Elements").
+/// Characters by the quadrants that they fill, lowest bit first (Unicode, "Block Elements").
 const QUADRANTS: [char; 16] =
     [' ', '▘', '▝', '▀', '▖', '▌', '▞', '▛', '▗', '▚', '▐', '▜', '▄', '▙', '▟', '█'];
-/// The first sextant (Unicode 13, "Symbols for Legacy Computing"). They follow each other by the places that they fill, but for
-/// the left and the right half.
+/// First sextant (Unicode 13, "Symbols for Legacy Computing"). Sextants are in the order of their masks,
+/// without the left and right half.
 const SEXTANTS: u32 = 0x1_FB00;
 const SEXTANTS_ELSEWHERE: [u32; 2] = [0b01_01_01, 0b10_10_10];
-/// The first octant (Unicode 16, "Symbols for Legacy Computing Supplement"). They follow each other in the same way, but for those
-/// that were there before.
+/// First octant (Unicode 16, "Symbols for Legacy Computing Supplement"). Octants are in the order of their
+/// masks, without those that Unicode already had.
 const OCTANTS: u32 = 0x1_CD00;
 const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
     (0b00_00_00_01, '\u{1CEA8}'),
@@ -152,12 +155,12 @@ const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
     (0b11_11_11_00, '▆'),
 ];
 
-/// The places of the grid that those of a coarser one of so many rows cover.
+/// Expands a mask with `rows` rows to the full grid.
 fn spread(mask: u32, rows: u32) -> u32 {
     widened(mask, rows, GRID_ROWS)
 }
 
-/// The same for another grid of two columns.
+/// Expands a mask from `from` to `to` rows.
 fn widened(mask: u32, from: u32, to: u32) -> u32 {
     let each = to / from;
     (0..2 * to)
@@ -165,36 +168,36 @@ fn widened(mask: u32, from: u32, to: u32) -> u32 {
         .fold(0, |all, place| all | 1 << place)
 }
 
-/// The quadrants that these octants fill, if they fill whole ones.
+/// The quadrants that are equal to these octants, if any.
 fn quadrants(mask: u32) -> Option<u32> {
     (0..16).find(|quadrants| spread(*quadrants, 2) == spread(mask, 4))
 }
 
-/// Grids that a cell is divided into.
+/// Grids that divide a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Grid {
     Halves,
     Quadrants,
-    /// And quadrants.
+    /// Sextants, and quadrants as well.
     Sextants,
     Octants,
 }
 
-/// A way to divide a cell.
+/// A division of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CellDivision {
-    /// The pixels of the first part, from the top left one along the rows.
+    /// Mask of the pixels of the first part, in row order.
     pub(super) first: u32,
     pub(super) tile: Tile,
 }
 
 impl Grid {
-    /// Pixels across a cell.
+    /// Pixels per cell, horizontally.
     pub(crate) fn columns(self) -> u32 {
         if self == Self::Halves { 1 } else { 2 }
     }
 
-    /// Pixels down a cell: as many as tell all its divisions apart.
+    /// Pixels per cell, vertically: enough to distinguish all divisions.
     pub(crate) fn rows(self) -> u32 {
         match self {
             Self::Halves | Self::Quadrants => 2,
@@ -203,7 +206,8 @@ impl Grid {
         }
     }
 
-    /// All ways to divide a cell of two columns, the halves first. Most differ from the one before in one part.
+    /// All divisions of a cell with two columns, halves first. Most differ from the previous one in a single
+    /// part.
     pub(super) fn divisions(self) -> &'static [CellDivision] {
         static QUADRANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(2, &[2]));
         static SEXTANTS: LazyLock<Vec<CellDivision>> = LazyLock::new(|| divisions(6, &[2, 3]));
@@ -217,12 +221,12 @@ impl Grid {
     }
 }
 
-/// The ways to fill parts of which these are in the height of a cell, in pixels of which so many are.
+/// All divisions into grids of two columns with `part_rows` rows, for a cell of `pixel_rows` pixel rows.
 fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
     let mut divisions = vec![CellDivision { first: (1 << pixel_rows) - 1, tile: Tile::HALVES }];
     for rows in part_rows {
         let half = 1_u32 << (2 * rows - 1);
-        // Gray's code; the top left part is always in.
+        // Gray code. The top left part is always included.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
             let of_tile = of_mask(spread(mask, *rows)).map(|(tile, _)| tile);
             let is_new = |tile: &Tile| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
@@ -239,7 +243,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_division_of_every_grid_has_its_characters() {
+    fn every_division_has_its_characters() {
         for (grid, count) in [(Grid::Quadrants, 7), (Grid::Sextants, 31 + 6), (Grid::Octants, 127)] {
             let divisions = grid.divisions();
             let mut seen = std::collections::HashSet::new();
@@ -256,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn known_characters() {
+    fn known_block_characters() {
         let symbol = |mask, rows| TABLE.symbols[&spread(mask, rows)];
         assert_eq!(symbol(0b1001, 2), '▚');
         assert_eq!(symbol(1, 3), '🬀');
@@ -269,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn shades_fill_a_quarter_a_half_and_three_quarters() {
+    fn shades_fill_one_two_or_three_quarters() {
         for (symbol, share) in [('░', 6), ('▒', 12), ('▓', 18)] {
             let (tile, is_second) = of_symbol(symbol).expect("a tile");
             assert_eq!(tile.sizes()[usize::from(is_second)], share, "{symbol}");

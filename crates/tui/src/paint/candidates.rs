@@ -1,28 +1,28 @@
-//! Colors that are worth being set at a cell.
+//! Candidate colors for a cell.
 
 use super::cell::Mosaic;
 use super::cost_model::CostModel;
 use super::terminal_color::{TerminalColor, digits};
 use crate::color::nearest_256;
 
-/// The most of them for one half, and for both together.
+/// Maximum number of candidates for one part, and for both parts together.
 const MOST: usize = 6;
-/// No color is looked for that serves longer than this.
+/// Number of following cells that a candidate may cover.
 const LONGEST: usize = 8;
 
-/// Themes of 22 colors put their own in the place of the first ones of the cube.
+/// Base16 themes with 22 colors replace the first entries of the color cube.
 const FIRST_UNTOUCHED: u8 = 22;
 
-/// Colors for the parts of one cell.
+/// Candidate colors for the parts of one cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CandidateColors {
     pub(super) first: Vec<TerminalColor>,
     pub(super) second: Vec<TerminalColor>,
-    /// For both parts at once.
+    /// Colors for both parts at once.
     pub(super) both: Vec<TerminalColor>,
 }
 
-/// For the first of these cells. Each candidate serves as many of the cells after it as it can.
+/// Candidates for the first of `cells`. Each one also suits as many of the following cells as possible.
 pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> CandidateColors {
     let column = |part: usize| cells.iter().map_while(move |cell| cell.map(|mosaic| mosaic.pair[part]));
     let both = cells.iter().map_while(|cell| cell.map(|mosaic| mosaic.pair)).flatten();
@@ -57,7 +57,7 @@ fn shades(wanted: &(impl Iterator<Item = TerminalColor> + Clone), model: CostMod
     shades
 }
 
-/// Colors that serve a row of wanted ones.
+/// The colors that suit all of a run of cells.
 struct CommonColors {
     low: [u8; 3],
     high: [u8; 3],
@@ -65,7 +65,7 @@ struct CommonColors {
     count: u32,
 }
 
-/// The colors within `span` of as many as possible.
+/// The colors within `span` of as many of the leading `wanted` colors as possible.
 fn common(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
     let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
@@ -89,7 +89,7 @@ impl CommonColors {
         std::array::from_fn(|i| mean(i).clamp(self.low[i], self.high[i]))
     }
 
-    /// The one of fewest digits; of those, the nearest to the mean.
+    /// The color with the fewest decimal digits, as close to the mean as possible.
     fn shortest(&self) -> [u8; 3] {
         let mean = self.mean();
         std::array::from_fn(|i| {
@@ -116,12 +116,12 @@ mod tests {
     }
 
     #[test]
-    fn a_color_serves_as_many_neighbors_as_it_can() {
+    fn candidates_cover_many_neighbors() {
         // 20 to 22 have 21 in common; 24 does not.
         let found = candidates(&row(&[20, 21, 22, 24]), CostModel::EXACT);
         assert_eq!(found.first, [TerminalColor::Rgb([21, 50, 99])]);
-        assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "16 may be another color");
-        assert_eq!(found.both.len(), 1, "the halves have nothing in common");
+        assert_eq!(found.second, [TerminalColor::Rgb([0, 0, 0])], "themes may replace color 16");
+        assert_eq!(found.both.len(), 1, "the halves have no common color");
         let grays = [Some(Mosaic::plain(TerminalColor::Rgb([8, 8, 8])))];
         assert_eq!(
             candidates(&grays, CostModel::EXACT).first,
@@ -130,12 +130,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_color_of_three_numbers_is_taken_as_it_is() {
-        let cells = [Some(Mosaic::halves([TerminalColor::Ground, TerminalColor::Palette(3)])), None];
+    fn palette_colors_are_kept_as_they_are() {
+        let cells =
+            [Some(Mosaic::halves([TerminalColor::DefaultBackground, TerminalColor::Palette(3)])), None];
         let found = candidates(&cells, CostModel::MOVING);
         assert_eq!(
             (found.first, found.second),
-            (vec![TerminalColor::Ground], vec![TerminalColor::Palette(3)])
+            (vec![TerminalColor::DefaultBackground], vec![TerminalColor::Palette(3)])
         );
         let found = candidates(&[None], CostModel::MOVING);
         assert!(found.first.is_empty() && found.both.is_empty());

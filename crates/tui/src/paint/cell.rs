@@ -1,4 +1,4 @@
-//! The look of a cell, however it was drawn.
+//! Appearance of a cell, independent of how it was drawn.
 
 use ratatui::buffer::Cell;
 use ratatui::style::Modifier;
@@ -9,16 +9,16 @@ use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
 use crate::mosaic::{PLACES, Tile, of_symbol};
 
-/// One cell of the screen.
+/// Content of one cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum CellContent {
-    /// Nobody knows.
+    /// The content is not known.
     Unknown,
-    /// Two colors, and which part of it has which: a blank is two halves of one color.
+    /// Two colors and the tile that divides them. A blank is two halves of the same color.
     Mosaic(Mosaic),
     /// A character.
     Text(Text),
-    /// The right part of a character that is two columns wide.
+    /// The right half of a wide character.
     Covered,
 }
 
@@ -26,12 +26,12 @@ pub(super) enum CellContent {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Mosaic {
     pub(super) tile: Tile,
-    /// Shades of the first and of the second part.
+    /// Colors of the first and the second part.
     pub(super) pair: [TerminalColor; 2],
 }
 
 impl Mosaic {
-    /// Whatever looks the same is the same.
+    /// Normalizes the tile, so that cells that look the same are equal.
     pub(super) fn new(tile: Tile, pair: [TerminalColor; 2]) -> Self {
         Self { tile: if pair[0] == pair[1] { Tile::HALVES } else { tile }, pair }
     }
@@ -40,12 +40,12 @@ impl Mosaic {
         Self { tile: Tile::HALVES, pair }
     }
 
-    /// One color.
+    /// A cell of one color.
     pub(super) fn plain(shade: TerminalColor) -> Self {
         Self::halves([shade; 2])
     }
 
-    /// The mosaic of a character. `None` for a character without blocks.
+    /// The mosaic of a block character. `None` for other characters.
     fn of(symbol: &str, fg: TerminalColor, bg: TerminalColor) -> Option<Self> {
         match symbol {
             " " => return Some(Self::plain(bg)),
@@ -56,7 +56,8 @@ impl Mosaic {
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 
-    /// Pairs of shades that meet in this cell and in the other, with the share of the cell, of 2, where they do.
+    /// Pairs of colors that overlap between this cell and `other`, with twice the fraction of the cell where
+    /// they do.
     pub(super) fn against(self, other: Self) -> impl Iterator<Item = (TerminalColor, TerminalColor, f32)> {
         let shared = self.tile.shared(other.tile);
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter();
@@ -67,7 +68,7 @@ impl Mosaic {
     }
 }
 
-/// A character, which may be made of several code points, and its style.
+/// A character, possibly of several code points, with its style.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Text {
     pub(super) symbol: Box<str>,
@@ -77,13 +78,13 @@ pub(super) struct Text {
 }
 
 impl Text {
-    /// Whether it is one code point of one column.
+    /// Whether it is a single code point, one column wide.
     pub(super) fn is_plain(&self) -> bool {
         self.columns == 1 && self.symbol.chars().nth(1).is_none()
     }
 }
 
-/// The four ways to fill the two parts of a cell by the two colors of the pen.
+/// The four ways to fill the two parts of a cell with the two colors of the pen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Glyph {
     Blank,
@@ -92,7 +93,7 @@ pub(super) enum Glyph {
     Full,
 }
 
-/// Modifiers that are seen on a blank.
+/// Modifiers that are visible on a blank.
 const ON_BLANKS: Modifier = Modifier::REVERSED
     .union(Modifier::UNDERLINED)
     .union(Modifier::SLOW_BLINK)
@@ -102,7 +103,7 @@ const ON_BLANKS: Modifier = Modifier::REVERSED
 impl Glyph {
     pub(super) const ALL: [Self; 4] = [Self::Blank, Self::First, Self::Second, Self::Full];
 
-    /// The character by which it fills this tile.
+    /// The character that fills this tile.
     pub(super) fn symbol(self, tile: Tile) -> char {
         match self {
             Self::Blank => ' ',
@@ -112,7 +113,7 @@ impl Glyph {
         }
     }
 
-    /// Layers that fill the first and the second part.
+    /// The layers that fill the first and the second part.
     pub(super) fn layers(self) -> [ColorLayer; 2] {
         match self {
             Self::Blank => [ColorLayer::Background; 2],
@@ -122,8 +123,8 @@ impl Glyph {
         }
     }
 
-    /// The wish to the pen; it leaves out colors that the mosaic does not show.
-    pub(super) fn wish(self, pair: [TerminalColor; 2]) -> PenRequirements {
+    /// Requirements on the pen; colors that the glyph does not show are unconstrained.
+    pub(super) fn requirements(self, pair: [TerminalColor; 2]) -> PenRequirements {
         let color =
             |layer| self.layers().iter().zip(pair).find(|(l, _)| **l == layer).map(|(_, shade)| shade);
         let matters = if self == Self::Blank { ON_BLANKS } else { Modifier::all() };
@@ -136,7 +137,7 @@ impl Glyph {
         }
     }
 
-    /// Whether it can show these colors.
+    /// Whether this glyph can show these colors.
     pub(super) fn shows(self, pair: [TerminalColor; 2]) -> bool {
         let [first, second] = self.layers();
         pair[0].fits(first) && pair[1].fits(second) && (first != second || pair[0] == pair[1])
@@ -144,11 +145,11 @@ impl Glyph {
 }
 
 impl CellContent {
-    /// A blank of the terminal's own background.
+    /// A blank in the terminal's default background.
     pub(super) const BLANK: Self =
-        Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::Ground; 2] });
+        Self::Mosaic(Mosaic { tile: Tile::HALVES, pair: [TerminalColor::DefaultBackground; 2] });
 
-    /// The look of a cell on a terminal of this depth.
+    /// The content of a cell on a terminal of this color depth.
     pub(super) fn of(cell: &Cell, depth: ColorDepth) -> Self {
         let shade = |color, layer| {
             let color = if depth == ColorDepth::None { ratatui::style::Color::Reset } else { color };
@@ -170,7 +171,7 @@ impl CellContent {
         )
     }
 
-    /// Columns that it takes.
+    /// Width in columns.
     pub(super) fn columns(&self) -> u16 {
         match self {
             Self::Text(text) => text.columns,
@@ -179,7 +180,7 @@ impl CellContent {
     }
 }
 
-/// The symbol of a cell and its columns; a blank for what would move the cursor or nothing at all.
+/// The symbol of a cell and its width; a blank if the symbol would move the cursor or print nothing.
 fn printable(symbol: &str) -> (&str, u16) {
     let columns = symbol.width();
     if columns == 0 || columns > 2 || symbol.chars().any(char::is_control) {
@@ -195,7 +196,7 @@ mod tests {
 
     use super::*;
 
-    fn look(symbol: &str, fg: Color, bg: Color, modifier: Modifier) -> CellContent {
+    fn content(symbol: &str, fg: Color, bg: Color, modifier: Modifier) -> CellContent {
         let mut cell = Cell::default();
         cell.set_symbol(symbol).set_fg(fg).set_bg(bg);
         cell.modifier = modifier;
@@ -203,39 +204,42 @@ mod tests {
     }
 
     #[test]
-    fn what_looks_the_same_is_the_same() {
+    fn cells_that_look_the_same_are_equal() {
         let none = Modifier::empty();
         let (a, b) = (Color::Rgb(1, 2, 3), Color::Rgb(4, 5, 6));
-        assert_eq!(look("▀", a, b, none), look("▄", b, a, none));
-        assert_eq!(look("█", a, b, none), look(" ", b, a, none));
-        assert_eq!(look("▚", a, b, none), look("▞", b, a, none));
-        assert_eq!(look("▚", a, a, none), look(" ", b, a, none));
-        assert_ne!(look("▚", a, b, none), look("▀", a, b, none));
-        assert_eq!(look(" ", a, b, Modifier::BOLD), look(" ", b, b, none));
-        assert_ne!(look(" ", a, b, Modifier::UNDERLINED), look(" ", a, b, none));
-        assert_ne!(look("▀", a, b, Modifier::DIM), look("▀", a, b, none));
-        assert_ne!(look("x", a, b, none), look("x", b, b, none));
-        assert_ne!(look("█", Color::Reset, a, none), look(" ", a, Color::Reset, none));
+        assert_eq!(content("▀", a, b, none), content("▄", b, a, none));
+        assert_eq!(content("█", a, b, none), content(" ", b, a, none));
+        assert_eq!(content("▚", a, b, none), content("▞", b, a, none));
+        assert_eq!(content("▚", a, a, none), content(" ", b, a, none));
+        assert_ne!(content("▚", a, b, none), content("▀", a, b, none));
+        assert_eq!(content(" ", a, b, Modifier::BOLD), content(" ", b, b, none));
+        assert_ne!(content(" ", a, b, Modifier::UNDERLINED), content(" ", a, b, none));
+        assert_ne!(content("▀", a, b, Modifier::DIM), content("▀", a, b, none));
+        assert_ne!(content("x", a, b, none), content("x", b, b, none));
+        assert_ne!(content("█", Color::Reset, a, none), content(" ", a, Color::Reset, none));
     }
 
     #[test]
-    fn nothing_that_moves_the_cursor_is_printed() {
+    fn cursor_movements_are_not_printed() {
         for symbol in ["", "\n", "\x1b[2J", "\u{301}", "a\x07"] {
             assert_eq!(
-                look(symbol, Color::Reset, Color::Reset, Modifier::empty()),
+                content(symbol, Color::Reset, Color::Reset, Modifier::empty()),
                 CellContent::BLANK,
                 "{symbol:?}"
             );
         }
-        assert_eq!(look("日", Color::Red, Color::Reset, Modifier::empty()).columns(), 2);
-        assert_eq!(look("e\u{301}", Color::Red, Color::Reset, Modifier::empty()).columns(), 1);
+        assert_eq!(content("日", Color::Red, Color::Reset, Modifier::empty()).columns(), 2);
+        assert_eq!(content("e\u{301}", Color::Red, Color::Reset, Modifier::empty()).columns(), 1);
     }
 
     #[test]
-    fn without_colors_there_are_none() {
+    fn monochrome_terminals_get_no_colors() {
         let mut cell = Cell::default();
         cell.set_symbol("x").set_fg(Color::Red).set_bg(Color::Blue);
         let CellContent::Text(text) = CellContent::of(&cell, ColorDepth::None) else { panic!("a character") };
-        assert_eq!((text.pen.fg, text.pen.bg), (TerminalColor::Ink, TerminalColor::Ground));
+        assert_eq!(
+            (text.pen.fg, text.pen.bg),
+            (TerminalColor::DefaultForeground, TerminalColor::DefaultBackground)
+        );
     }
 }

@@ -1,29 +1,29 @@
-//! The price of a byte in error.
+//! Cost model that weighs bytes against color error.
 
 use super::terminal_color::TerminalColor;
 
-/// Weights of bytes against error. The error of a half of a cell is the sum of the squared differences of its channels.
+/// Weights of bytes against error. The error of half a cell is the sum of the squared channel differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CostModel {
-    /// Error that a byte may save.
+    /// Error that is worth saving one byte.
     pub(super) byte: f32,
-    /// No channel may be farther off than this.
+    /// Maximum difference of a channel.
     pub(super) most: u8,
-    /// Neighbours that differ by twice this in no channel may become one color: colors are tried for each.
+    /// Half widths of the ranges in which neighboring colors may be merged; candidates are tried for each.
     pub(super) spans: &'static [u8],
 }
 
 impl CostModel {
-    /// Every color to 1/255.
+    /// Colors exact to 1/255.
     pub(super) const EXACT: Self = Self { byte: 64.0, most: 1, spans: &[1] };
 
-    /// Every color, whatever it takes.
+    /// Exact colors.
     pub(super) const ALL: Self = Self { byte: 64.0, most: 0, spans: &[0] };
 
-    /// An error of 14/255 in all channels of a half is about worth the bytes of a color.
+    /// An error of 14/255 in all channels of a half is worth about the bytes of a color change.
     pub(super) const MOVING: Self = Self { byte: 32.0, most: 255, spans: &[1, 4, 9] };
 
-    /// The same where a byte is worth this much, or as much as for a moving picture at least.
+    /// The same model with another cost per byte, at least that of [`CostModel::MOVING`].
     pub(super) fn at(self, byte: f32) -> Self {
         let byte = byte.max(Self::MOVING.byte);
         let spans: &[u8] = match byte {
@@ -35,7 +35,7 @@ impl CostModel {
         Self { byte, spans, ..self }
     }
 
-    /// The error of showing one color for another; infinite where that must not be.
+    /// The error of showing one color instead of another; infinite if that is not allowed.
     pub(super) fn error(self, shown: TerminalColor, wanted: TerminalColor) -> f32 {
         if shown == wanted {
             return 0.0;
@@ -54,13 +54,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_are_sums_of_squares_up_to_a_limit() {
+    fn error_is_a_bounded_sum_of_squares() {
         let (a, b) = (TerminalColor::Rgb([10, 20, 30]), TerminalColor::Rgb([11, 20, 32]));
         assert_eq!(CostModel::MOVING.error(a, b), 5.0);
         assert_eq!(CostModel::EXACT.error(a, b), f32::INFINITY);
         assert_eq!(CostModel::EXACT.error(a, TerminalColor::Rgb([9, 21, 30])), 2.0);
         assert_eq!(CostModel::MOVING.error(TerminalColor::Palette(16), TerminalColor::Rgb([1, 1, 0])), 2.0);
-        assert_eq!(CostModel::MOVING.error(TerminalColor::Ground, TerminalColor::Palette(0)), f32::INFINITY);
-        assert_eq!(CostModel::MOVING.error(TerminalColor::Ground, TerminalColor::Ground), 0.0);
+        assert_eq!(
+            CostModel::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::Palette(0)),
+            f32::INFINITY
+        );
+        assert_eq!(
+            CostModel::MOVING.error(TerminalColor::DefaultBackground, TerminalColor::DefaultBackground),
+            0.0
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Moves of the cursor in few bytes.
+//! Cursor movement in as few bytes as possible.
 
 use super::terminal_color::push_number;
 
@@ -9,8 +9,8 @@ pub(super) struct CellPosition {
     pub(super) y: u16,
 }
 
-/// Appends the shortest move. `from` is none where the cursor may be anywhere, as after a character in the last column.
-/// None of the moves scrolls, wraps or depends on modes.
+/// Appends the shortest movement. `from` is `None` if the cursor position is unknown, for example after a
+/// character in the last column. No movement scrolls, wraps or depends on terminal modes.
 pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>) {
     let Some(from) = from else { return absolute(to, out) };
     if from == to {
@@ -28,7 +28,7 @@ pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>
         consider(with_return(&[], to.x));
     } else if from.y < to.y {
         let down = usize::from(to.y - from.y);
-        // Below the start of a line; a line feed alone would depend on the modes of the line.
+        // A line feed alone depends on the tty's modes, so it always follows a carriage return.
         if down <= 8 {
             consider(with_return(&vec![b'\n'; down], to.x));
         }
@@ -41,7 +41,7 @@ pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>
     out.extend_from_slice(&best);
 }
 
-/// CUP.
+/// Absolute position (CUP).
 fn absolute(to: CellPosition, out: &mut Vec<u8>) {
     out.extend_from_slice(b"\x1b[");
     if to.y > 0 || to.x > 0 {
@@ -54,12 +54,12 @@ fn absolute(to: CellPosition, out: &mut Vec<u8>) {
     out.push(b'H');
 }
 
-/// CUF or CUB; CHA is never shorter than both this and CUP.
+/// Movement within a row (CUF or CUB). CHA is never shorter than both this and CUP.
 fn along(from: u16, to: u16) -> Vec<u8> {
     if to >= from { control(to - from, b'C') } else { control(from - to, b'D') }
 }
 
-/// To the start of the line, down, and to the right.
+/// Carriage return, line feeds, then right.
 fn with_return(down: &[u8], column: u16) -> Vec<u8> {
     let mut bytes = vec![b'\r'];
     bytes.extend_from_slice(down);
@@ -69,7 +69,7 @@ fn with_return(down: &[u8], column: u16) -> Vec<u8> {
     bytes
 }
 
-/// CSI with a count, which is left out if it is 1.
+/// A control sequence with a count, which is omitted if it is 1.
 pub(super) fn control(count: u16, end: u8) -> Vec<u8> {
     let mut bytes = b"\x1b[".to_vec();
     if count != 1 {
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn moves_are_short() {
+    fn cursor_moves_are_short() {
         assert_eq!(moved((5, 5), (5, 5)), "");
         assert_eq!(moved((5, 5), (6, 5)), "\x1b[C");
         assert_eq!(moved((5, 5), (0, 5)), "\r");
@@ -106,7 +106,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_move_arrives(from in (0_u16..120, 0_u16..40), to in (0_u16..120, 0_u16..40), known in any::<bool>()) {
+        fn every_move_reaches_its_target(from in (0_u16..120, 0_u16..40), to in (0_u16..120, 0_u16..40), known in any::<bool>()) {
             let side = |length| std::num::NonZero::new(length).expect("not zero");
             let mut parser = vt100::Parser::new(side(40), side(120), 0);
             let (mut start, mut out) = (Vec::new(), Vec::new());

@@ -1,14 +1,14 @@
-//! The precision that a picture is drawn with.
+//! Precision of a drawn preview.
 
-/// Precision with which cells show the picture.
+/// Precision with which cells show the preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fidelity {
-    /// The first picture of a request, to be refined soon: at most 12 bytes a cell.
+    /// The first preview of a request, soon refined: at most 12 bytes per cell.
     First,
-    /// A picture of the same request that better ones will follow.
+    /// A later preview that will still be refined.
     Moving,
-    /// The same on a terminal that can follow the render: every color.
+    /// Like `Moving`, on a terminal that can follow the render: exact colors.
     Following,
-    /// A picture that stays: every color to 1/255.
+    /// A final preview: colors exact to 1/255.
     Still,
 }

@@ -1,69 +1,69 @@
-//! Choice of the pictures that are worth drawing.
+//! Frame pacing: decides which previews are worth drawing.
 
 use std::time::{Duration, Instant};
 
 use super::fidelity::Fidelity;
 
-/// The moment at which there is a picture that was not aimed at yet.
+/// Inputs of the decision about a new preview.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTiming {
-    /// Bytes per second of the line. `None` if it is faster than anybody noticed.
+    /// Bandwidth of the connection. `None` if it is too fast to measure.
     pub bytes_per_second: Option<f64>,
-    /// Cells of the picture.
+    /// Cells of the preview.
     pub cells: u32,
-    /// Mean samples per pixel of the current picture; 0 for a coarse picture.
+    /// Mean samples per pixel of the new preview; 0 for a coarse one.
     pub samples: f64,
-    /// Mean samples per pixel of this request's last picture that was aimed at. `None` if there was none.
+    /// Mean samples per pixel of the last drawn preview of this request. `None` if there is none.
     pub aimed_samples: Option<f64>,
-    /// Since then.
+    /// Time since that preview became the target.
     pub since_aim: Duration,
-    /// Whether that picture is on the screen: sent, and, where the terminal is quick, answered for.
+    /// Whether that preview has been sent and, on a fast terminal, acknowledged.
     pub is_shown: bool,
-    /// Whether the terminal takes bytes so fast that it can follow the render.
-    pub is_quick: bool,
-    /// Whether the picture is drawn in pixels.
+    /// Whether the terminal is fast enough to follow the render.
+    pub is_fast: bool,
+    /// Whether the preview is drawn as pixels.
     pub is_in_pixels: bool,
-    /// Whether the picture stays.
+    /// Whether the preview is final.
     pub is_final: bool,
-    /// Time to the final picture, if known.
+    /// Estimated time until the final preview, if known.
     pub final_in: Option<Duration>,
 }
 
-/// Advice about a picture.
+/// What to do with a preview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PacingAdvice {
-    /// Aim at it.
+    /// Draw it.
     Aim(Fidelity),
     /// Wait for a better one.
     Wait,
 }
 
-/// Bytes that a cell takes until it is as it stays, about.
+/// Approximate bytes per cell until a preview settles.
 const MOVING_BYTES: f64 = 6.0;
-/// At least so many times the samples of the picture before: the noise falls by the root of that.
+/// Minimum factor between the sample counts of successive previews; noise falls with its square root.
 const MORE_SAMPLES: f64 = 2.0;
-/// The same while the picture before is still on its way.
+/// Minimum factor while the previous preview is still being sent.
 const MANY_MORE_SAMPLES: f64 = 4.0;
-/// While pixels get their first sample, a picture that has so many more of them is worth being drawn.
+/// During the first sample, draw again after this fraction of a sample per pixel.
 const FIRST_PASS: f64 = 0.25;
-/// Pictures come no faster than this, but for the first and the last one.
+/// Minimum time between previews, except for the first and the last one.
 const SHORTEST: Duration = Duration::from_millis(100);
-/// The same of pictures in pixels, which take time to be encoded and decoded.
+/// Minimum time between previews drawn as pixels, which take time to encode and decode.
 const SHORTEST_IN_PIXELS: Duration = Duration::from_millis(180);
-/// After this any picture is better than one that stands still.
+/// After this time any improvement is drawn.
 const LONGEST: Duration = Duration::from_secs(2);
-/// Part of the line that pictures on the way may take.
+/// Fraction of the bandwidth that intermediate previews may use.
 const SHARE: f64 = 0.5;
 
-/// Whether a picture is worth its bytes. The first and the last one always are. A quick terminal gets every picture, 5 to
-/// 10 times a second. On a line that takes long for a picture there are few in between, and none that would keep the
-/// last one waiting.
+/// Decides whether a preview is worth its bytes. The first and the last preview always are. A fast terminal
+/// gets 5 to 10 previews per second. A slow connection gets few intermediate previews, and none that would
+/// delay the last one.
 pub fn advise(moment: &FrameTiming) -> PacingAdvice {
     if moment.is_final {
         return PacingAdvice::Aim(Fidelity::Still);
     }
     let Some(aimed) = moment.aimed_samples else { return PacingAdvice::Aim(Fidelity::First) };
-    if moment.is_quick {
+    if moment.is_fast {
         let is_due = moment.is_shown && moment.since_aim >= moment.shortest();
         return if is_due { PacingAdvice::Aim(Fidelity::Following) } else { PacingAdvice::Wait };
     }
@@ -85,17 +85,17 @@ pub fn advise(moment: &FrameTiming) -> PacingAdvice {
 }
 
 impl FrameTiming {
-    /// The time between two pictures on a quick terminal.
+    /// Minimum time between two previews on a fast terminal.
     fn shortest(&self) -> Duration {
         if self.is_in_pixels { SHORTEST_IN_PIXELS } else { SHORTEST }
     }
 
-    /// When a quick terminal is to get the next picture, if one waits.
+    /// When a fast terminal should get the next preview, if one is pending.
     pub fn due(&self, aimed: Instant) -> Option<Instant> {
-        (self.is_quick && self.is_shown).then(|| aimed + self.shortest())
+        (self.is_fast && self.is_shown).then(|| aimed + self.shortest())
     }
 
-    /// Time of the line for a picture on the way.
+    /// Time to send an intermediate preview.
     fn frame(&self) -> Duration {
         let bytes = f64::from(self.cells) * MOVING_BYTES;
         self.bytes_per_second.map_or(Duration::ZERO, |rate| {
@@ -110,7 +110,7 @@ impl FrameTiming {
 mod tests {
     use super::*;
 
-    /// A second after an aim at one sample.
+    /// One second after drawing a preview with one sample.
     const MOMENT: FrameTiming = FrameTiming {
         bytes_per_second: None,
         cells: 2500,
@@ -118,7 +118,7 @@ mod tests {
         aimed_samples: Some(1.0),
         since_aim: Duration::from_secs(1),
         is_shown: true,
-        is_quick: false,
+        is_fast: false,
         is_in_pixels: false,
         is_final: false,
         final_in: None,
@@ -127,7 +127,7 @@ mod tests {
     const MOVING: PacingAdvice = PacingAdvice::Aim(Fidelity::Moving);
 
     #[test]
-    fn the_first_and_the_last_picture_are_drawn_whatever_the_line() {
+    fn first_and_last_preview_are_always_drawn() {
         for bytes_per_second in [None, Some(0.0), Some(100.0), Some(f64::NAN)] {
             let slow = FrameTiming { bytes_per_second, since_aim: Duration::ZERO, is_shown: false, ..MOMENT };
             assert_eq!(
@@ -139,27 +139,27 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_on_the_way_has_twice_the_samples() {
+    fn intermediate_previews_double_the_samples() {
         assert_eq!(advise(&MOMENT), PacingAdvice::Wait);
         assert_eq!(advise(&FrameTiming { samples: 2.0, ..MOMENT }), MOVING);
         let late = FrameTiming { since_aim: Duration::from_secs(3), ..MOMENT };
-        assert_eq!(advise(&late), MOVING, "or it is a while ago");
+        assert_eq!(advise(&late), MOVING, "after a long time any progress counts");
         assert_eq!(
             advise(&FrameTiming { samples: 1.0, ..late }),
             PacingAdvice::Wait,
-            "but not the same one again"
+            "an unchanged preview is not repeated"
         );
     }
 
     #[test]
-    fn a_quick_terminal_gets_every_picture_5_to_10_times_a_second() {
+    fn fast_terminals_get_5_to_10_previews_a_second() {
         let following = PacingAdvice::Aim(Fidelity::Following);
-        let quick = FrameTiming { is_quick: true, since_aim: Duration::from_millis(100), ..MOMENT };
-        assert_eq!(advise(&quick), following, "however few samples are new");
+        let quick = FrameTiming { is_fast: true, since_aim: Duration::from_millis(100), ..MOMENT };
+        assert_eq!(advise(&quick), following, "no matter how few samples are new");
         assert_eq!(
             advise(&FrameTiming { samples: 0.5, ..quick }),
             following,
-            "their number may be told late"
+            "the sample count may lag behind"
         );
         assert_eq!(
             advise(&FrameTiming { since_aim: Duration::from_millis(99), ..quick }),
@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(
             advise(&FrameTiming { is_shown: false, ..quick }),
             PacingAdvice::Wait,
-            "one after the other"
+            "previews do not overlap"
         );
         let in_pixels = FrameTiming { is_in_pixels: true, ..quick };
         assert_eq!(advise(&in_pixels), PacingAdvice::Wait);
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_pass_is_shown_in_parts() {
+    fn first_pass_is_drawn_in_steps() {
         let coarse = FrameTiming { samples: 0.1, aimed_samples: Some(0.0), ..MOMENT };
         assert_eq!(advise(&coarse), PacingAdvice::Wait);
         assert_eq!(advise(&FrameTiming { samples: 0.25, ..coarse }), MOVING);
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn on_a_thin_line_pictures_are_few() {
+    fn slow_connections_get_few_previews() {
         // 15 kB: a quarter of a second at 60 kB/s.
         let thin = FrameTiming { bytes_per_second: Some(60e3), samples: 2.0, ..MOMENT };
         assert_eq!(advise(&thin), MOVING);
@@ -195,18 +195,22 @@ mod tests {
         assert_eq!(
             advise(&FrameTiming { is_shown: false, ..thin }),
             PacingAdvice::Wait,
-            "the one before is on its way"
+            "the previous preview is still being sent"
         );
-        assert_eq!(advise(&FrameTiming { is_shown: false, samples: 4.0, ..thin }), MOVING, "but much worse");
+        assert_eq!(
+            advise(&FrameTiming { is_shown: false, samples: 4.0, ..thin }),
+            MOVING,
+            "the previous preview is much worse"
+        );
         let ending = FrameTiming { final_in: Some(Duration::from_millis(200)), ..thin };
-        assert_eq!(advise(&ending), PacingAdvice::Wait, "the last one would wait for it");
+        assert_eq!(advise(&ending), PacingAdvice::Wait, "it would delay the last preview");
     }
 
     #[test]
-    fn a_render_of_64_samples_shows_a_handful_of_pictures() {
+    fn short_render_draws_a_handful_of_previews() {
         for (bytes_per_second, most) in [(None, 12), (Some(125e3), 8), (Some(10e3), 2)] {
             let (mut aimed, mut at, mut count) = (None, 0.0, 0);
-            // 2.5 seconds, a preview every 66 ms.
+            // 2.5 seconds with a preview every 66 ms.
             for preview in 0..38_u32 {
                 let seconds = f64::from(preview) * 0.066;
                 let moment = FrameTiming {

@@ -1,29 +1,29 @@
-//! Links in the text (OSC 8).
+//! Hyperlinks in the text (OSC 8).
 
 use ratatui::layout::Rect;
 
-/// Bytes that end a link.
+/// Bytes that end a hyperlink.
 pub const LINK_OFF: &[u8] = b"\x1b]8;;\x1b\\";
-/// Most links of a screen.
+/// Maximum number of hyperlinks per screen.
 const MOST: usize = 1000;
 
-/// Cells in a row, and the address that they lead to.
+/// Adjacent cells of one row and the URL that they link to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hyperlink {
     /// The cells.
     pub cells: Rect,
-    /// An address in ASCII without control characters.
+    /// An ASCII URL without control characters.
     pub address: String,
 }
 
-/// Addresses by number, from 1. An address keeps its number as long as the screen is known.
+/// URLs by number, from 1. A URL keeps its number while the screen content is known.
 #[derive(Debug, Default)]
 pub(super) struct Hyperlinks {
     addresses: Vec<String>,
 }
 
 impl Hyperlinks {
-    /// The number of an address. 0 if it cannot be one, or if there are too many.
+    /// The number of a URL; 0 if it is invalid or if there are too many.
     pub(super) fn number(&mut self, address: &str) -> u16 {
         if !address.bytes().all(|byte| byte.is_ascii_graphic()) {
             return 0;
@@ -35,11 +35,11 @@ impl Hyperlinks {
             }
             self.addresses.len() - 1
         });
-        let is_there = self.addresses.get(index).is_some_and(|there| there == address);
-        if is_there { u16::try_from(index + 1).unwrap_or(0) } else { 0 }
+        let is_known = self.addresses.get(index).is_some_and(|there| there == address);
+        if is_known { u16::try_from(index + 1).unwrap_or(0) } else { 0 }
     }
 
-    /// Appends what begins the link of a number, and ends the one before.
+    /// Appends the bytes that open a hyperlink and close the previous one.
     pub(super) fn open(&self, number: u16, out: &mut Vec<u8>) {
         let address = usize::from(number).checked_sub(1).and_then(|index| self.addresses.get(index));
         match address {
@@ -48,7 +48,7 @@ impl Hyperlinks {
         }
     }
 
-    /// Whether there was any.
+    /// Whether no hyperlink was registered.
     pub(super) fn is_empty(&self) -> bool {
         self.addresses.is_empty()
     }
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_address_keeps_its_number_and_a_bad_one_has_none() {
+    fn hyperlinks_keep_their_numbers() {
         let mut links = Hyperlinks::default();
         assert_eq!(
             [links.number("file:///a"), links.number("file:///b"), links.number("file:///a")],

@@ -1,4 +1,4 @@
-//! Cells as lines, for a terminal that is written to from the top to the bottom.
+//! Cells as lines of text, for output without cursor movement.
 
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::style::Color;
@@ -6,8 +6,8 @@ use ratatui::style::Color;
 use super::pen::Pen;
 use super::terminal_color::{ColorLayer, TerminalColor};
 
-/// The rows of a buffer, each with a line end and without the blanks before it. Each begins and ends with the terminal's own colors;
-/// without colors there is no escape sequence at all.
+/// The rows of a buffer as lines, without trailing blanks. Each line starts and ends with the terminal's
+/// default colors; without colors there are no escape sequences at all.
 pub fn in_lines(buffer: &Buffer, is_colored: bool) -> String {
     let mut bytes = Vec::new();
     for row in buffer.content.chunks(usize::from(buffer.area.width.max(1))) {
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_line_ends_with_the_colors_of_the_terminal() {
+    fn lines_end_with_default_colors() {
         let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 3));
         buffer.set_string(0, 0, "ab", Style::new().fg(Color::Red));
         buffer.set_string(2, 2, "▀", Style::new().fg(Color::Rgb(1, 2, 3)).bg(Color::Indexed(9)));

@@ -1,16 +1,16 @@
-//! Bytes for the terminal: only what changes to the eye, in slices.
+//! Incremental terminal output: encodes only visible changes, in slices.
 //!
-//! A [`Painter`] knows what is on the screen, because it sent it. It is aimed at a buffer of cells and gives the bytes
-//! that lead there, slice by slice; a newer aim takes the place of the rest of the older one. A cell counts as the
-//! two colors of its parts, however they are drawn: `▀ ▄ █` and the blank show the same halves in several ways, as
-//! other characters do other parts, and the one that costs least after what was drawn before is taken.
+//! A [`Painter`] knows what the screen shows because it sent everything there. It is given a target buffer
+//! and returns the bytes that lead there, slice by slice; a new target replaces the rest of the previous one.
+//! A cell is compared by the two colors of its parts, however they are drawn: `▀ ▄ █` and the space can show
+//! the same halves in several ways. The painter picks the way that costs the fewest bytes after the
+//! previously drawn cell.
 //!
-//! Words are exact. A picture that will be followed by better ones is drawn as far as an error is worth its bytes,
-//! on a quick terminal exactly, and where an edit changed nothing the screen is left alone. A picture that stays is
-//! exact to 1/255.
-//! [`advise`] tells which pictures are worth being aimed at on a line of some speed.
+//! Text is always exact. A preview that will be followed by better ones is drawn only as precisely as its
+//! bytes are worth (exactly on a fast terminal), and cells that an edit did not change are kept. A final
+//! preview is exact to 1/255. [`advise`] decides which previews are worth drawing on a connection of a given
+//! speed.
 
-mod abilities;
 mod candidates;
 mod cell;
 mod cost_model;
@@ -21,6 +21,7 @@ mod hyperlinks;
 mod lines;
 mod pen;
 mod picture;
+mod rep_support;
 mod row_optimizer;
 mod screen;
 mod stable_cells;
@@ -35,71 +36,71 @@ use std::vec;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-pub use self::abilities::can_repeat;
 pub use self::fidelity::Fidelity;
 pub use self::frame_pacing::{FrameTiming, PacingAdvice, advise};
 use self::hyperlinks::Hyperlinks;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
 pub use self::lines::in_lines;
 use self::picture::ByteBudget;
+pub use self::rep_support::can_repeat;
 use self::screen::{OutputSlice, ScreenModel, Stroke};
 use self::stable_cells::StableCells;
 use self::target_screen::{ScreenRegion, TargetScreen};
 use super::color::ColorDepth;
 
-/// Leads the screen to what is wanted.
+/// Draws target screens incrementally.
 #[derive(Debug)]
 pub struct Painter {
     depth: ColorDepth,
-    /// Whether the terminal knows REP.
+    /// Whether the terminal supports REP.
     can_repeat: bool,
-    /// None: its content is unknown.
+    /// `None` while the content is unknown.
     screen: Option<ScreenModel>,
     memory: StableCells,
     wanted: TargetScreen,
     links: Hyperlinks,
     budget: ByteBudget,
-    /// Parts still to be looked at, in order.
+    /// Remaining steps, in order.
     parts: vec::IntoIter<DrawStep>,
-    /// The part that is being drawn.
+    /// The step being drawn.
     part: Option<DrawStep>,
     strokes: vec::IntoIter<Stroke>,
-    /// Progress of the picture in each row.
+    /// Progress of the preview in each row.
     rows: Vec<RowProgress>,
     aim: u64,
 }
 
-/// A part of the screen that is drawn in one go.
+/// One step of drawing the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DrawStep {
-    /// The words of a row.
+    /// The text in a row.
     Words(u16),
-    /// The picture in a row.
+    /// The preview in a row.
     Picture(u16),
-    /// Words in a row that wait for the picture.
+    /// Text in a row that is drawn after the preview.
     Later(u16),
 }
 
-/// Content of a screen besides its cells.
+/// Content of a frame other than its cells.
 #[derive(Clone, Debug, Default)]
 pub struct FrameExtras {
-    /// Words in these cells come after the picture.
+    /// Text in these cells is drawn after the preview.
     pub later: Rect,
-    /// Links in the text.
+    /// Hyperlinks in the text.
     pub links: Vec<Hyperlink>,
 }
 
-/// Progress of the picture in a row.
+/// Progress of the preview in a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct RowProgress {
-    /// The number of the last aim that it was drawn for.
+    /// Number of the last target that the row was drawn for.
     aim: u64,
-    /// Whether it is as it is wanted.
+    /// Whether the row matches its target.
     is_done: bool,
 }
 
 impl Painter {
-    /// For a terminal of that many colors, whose content is unknown.
+    /// A painter for a terminal of this color depth whose content is unknown.
     pub fn new(depth: ColorDepth) -> Self {
         Self {
             depth,
@@ -117,25 +118,25 @@ impl Painter {
         }
     }
 
-    /// The same for a terminal that knows REP; see [`can_repeat`].
+    /// Sets whether the terminal supports REP; see [`can_repeat`].
     pub fn repeating(self, can_repeat: bool) -> Self {
         Self { can_repeat, ..self }
     }
 
-    /// Show this from now on, whatever is left of what was wanted before. `picture`: where cells may differ from
-    /// what is wanted as far as the fidelity says; all others are words and come first. A buffer of another size than
-    /// the one before means that the screen has been resized.
+    /// Sets a new target and drops the rest of the previous one. Cells in `picture` may differ from the
+    /// target as `fidelity` permits; all others are text and are drawn first. A buffer of a different size
+    /// means that the screen was resized.
     ///
-    /// The picture goes on with the rows that the aims before did not come to, so that aims that follow each other
-    /// faster than they are drawn lead to the edge all the same.
+    /// The preview continues with the rows that earlier targets did not reach, so it is drawn up to its edges
+    /// even if targets change faster than they can be drawn.
     pub fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
         self.aim_with(wanted, picture, fidelity, &FrameExtras::default());
     }
 
-    /// The same with links, and with words that come after the picture.
-    pub fn aim_with(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, besides: &FrameExtras) {
-        let mut wanted = TargetScreen::new(wanted, picture, fidelity, self.depth).with_later(besides.later);
-        for Hyperlink { cells, address } in &besides.links {
+    /// Like [`Painter::aim`], with hyperlinks and with text that is drawn after the preview.
+    pub fn aim_with(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, extras: &FrameExtras) {
+        let mut wanted = TargetScreen::new(wanted, picture, fidelity, self.depth).with_later(extras.later);
+        for Hyperlink { cells, address } in &extras.links {
             wanted.link(*cells, self.links.number(address));
         }
         let size = (wanted.columns, wanted.rows);
@@ -170,15 +171,15 @@ impl Painter {
         self.budget = ByteBudget::default();
     }
 
-    /// The next bytes towards what is wanted, at most so many unless one cell needs more. Empty: it is shown. They
-    /// have to be written: what follows builds on them. Between two slices nobody else may move the cursor or
-    /// change the colors.
+    /// The next bytes towards the target, at most `most_bytes` unless a single cell needs more. Empty if the
+    /// target is reached. The caller must write them because later slices build on them, and nothing else may
+    /// move the cursor or change colors between two slices.
     pub fn slice(&mut self, most_bytes: usize) -> Vec<u8> {
         self.slice_until(most_bytes, || false)
     }
 
-    /// The next slice; if `is_late` says so, only the bytes so far. It is asked before each row: to plan a picture takes longer
-    /// than a key may wait.
+    /// Like [`Painter::slice`], but stops early once `is_late` returns true. It is called before each row
+    /// because planning a whole preview takes longer than a key press may wait.
     pub fn slice_until(&mut self, most_bytes: usize, is_late: impl Fn() -> bool) -> Vec<u8> {
         let mut slice = OutputSlice { bytes: Vec::new(), most: most_bytes };
         if self.wanted.is_empty() {
@@ -230,7 +231,7 @@ impl Painter {
         slice.bytes
     }
 
-    /// The content of these cells is unknown from now on.
+    /// Marks the content of these cells as unknown.
     pub fn damage(&mut self, cells: Rect) {
         if let Some(screen) = &mut self.screen {
             screen.damage(cells);
@@ -238,7 +239,7 @@ impl Painter {
         }
     }
 
-    /// The content of the screen is unknown from now on: it is cleared before anything else is drawn.
+    /// Marks the whole screen as unknown; it is cleared before the next draw.
     pub fn forget(&mut self) {
         self.screen = None;
         self.memory.forget();

@@ -1,4 +1,4 @@
-//! Colors and modifiers that the terminal writes with.
+//! Colors and modifiers of the terminal's pen.
 
 use ratatui::style::Modifier;
 
@@ -10,26 +10,26 @@ pub(super) struct Pen {
     pub(super) fg: TerminalColor,
     pub(super) bg: TerminalColor,
     pub(super) modifier: Modifier,
-    /// Number of the link that the character belongs to; 0 for none.
+    /// Number of the hyperlink that the character belongs to; 0 for none.
     pub(super) link: u16,
 }
 
 /// Requirements on a pen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PenRequirements {
-    /// None: any.
+    /// `None` if any color will do.
     pub(super) fg: Option<TerminalColor>,
-    /// None: any.
+    /// `None` if any color will do.
     pub(super) bg: Option<TerminalColor>,
-    /// Modifiers, of those that matter.
+    /// Required state of the modifiers in `matters`.
     pub(super) modifier: Modifier,
-    /// The others may be on or off.
+    /// The modifiers that matter; others may be on or off.
     pub(super) matters: Modifier,
-    /// Number of the link; 0 for none.
+    /// Number of the hyperlink; 0 for none.
     pub(super) link: u16,
 }
 
-/// Modifiers with the parameters of SGR that turn them on and off.
+/// Modifiers with the SGR parameters that turn them on and off.
 const MODIFIERS: [(Modifier, u16, u16); 9] = [
     (Modifier::BOLD, 1, 22),
     (Modifier::DIM, 2, 22),
@@ -43,11 +43,15 @@ const MODIFIERS: [(Modifier, u16, u16); 9] = [
 ];
 
 impl Pen {
-    /// After SGR 0.
-    pub(super) const RESET: Self =
-        Self { fg: TerminalColor::Ink, bg: TerminalColor::Ground, modifier: Modifier::empty(), link: 0 };
+    /// The pen after SGR 0.
+    pub(super) const RESET: Self = Self {
+        fg: TerminalColor::DefaultForeground,
+        bg: TerminalColor::DefaultBackground,
+        modifier: Modifier::empty(),
+        link: 0,
+    };
 
-    /// This pen and nothing else.
+    /// Requirements that only this pen meets.
     pub(super) fn exactly(self) -> PenRequirements {
         PenRequirements {
             fg: Some(self.fg),
@@ -58,16 +62,16 @@ impl Pen {
         }
     }
 
-    /// Appends the shortest SGR that turns the pen into one that fulfils the wish; appends nothing if the pen does already. Links
-    /// are the screen's.
-    pub(super) fn turn(&mut self, wish: &PenRequirements, out: &mut Vec<u8>) {
+    /// Appends the shortest SGR sequence that makes the pen meet the requirements, if it does not already.
+    /// The screen model handles hyperlinks.
+    pub(super) fn turn(&mut self, requirements: &PenRequirements, out: &mut Vec<u8>) {
         let mut list = Vec::new();
-        let changed = self.changed(wish, &mut list);
+        let changed = self.changed(requirements, &mut list);
         if list.is_empty() {
             return;
         }
         let mut afresh = b"0".to_vec();
-        let reset = Self { link: self.link, ..Self::RESET }.changed(wish, &mut afresh);
+        let reset = Self { link: self.link, ..Self::RESET }.changed(requirements, &mut afresh);
         let is_shorter = afresh.len() < list.len();
         out.extend_from_slice(b"\x1b[");
         out.extend_from_slice(if is_shorter { &afresh } else { &list });
@@ -75,28 +79,29 @@ impl Pen {
         *self = if is_shorter { reset } else { changed };
     }
 
-    /// Appends the parameters that turn this pen into one as wished, which is returned.
-    fn changed(mut self, wish: &PenRequirements, list: &mut Vec<u8>) -> Self {
-        let surplus = (self.modifier - wish.modifier) & wish.matters;
+    /// Appends the parameters that make this pen meet the requirements, and returns the new pen.
+    fn changed(mut self, requirements: &PenRequirements, list: &mut Vec<u8>) -> Self {
+        let surplus = (self.modifier - requirements.modifier) & requirements.matters;
         for (modifier, _, off) in MODIFIERS {
             if surplus.contains(modifier) && self.modifier.contains(modifier) {
                 push_parameter(off, list);
-                // One parameter may turn two off.
+                // One parameter can turn off two modifiers.
                 for (other, _, other_off) in MODIFIERS {
                     self.modifier.set(other, self.modifier.contains(other) && other_off != off);
                 }
             }
         }
-        let missing = (wish.modifier & wish.matters) - self.modifier;
+        let missing = (requirements.modifier & requirements.matters) - self.modifier;
         for (modifier, on, _) in MODIFIERS {
             if missing.contains(modifier) {
                 push_parameter(on, list);
             }
         }
         self.modifier |= missing;
-        for (own, wished, layer) in
-            [(&mut self.fg, wish.fg, ColorLayer::Foreground), (&mut self.bg, wish.bg, ColorLayer::Background)]
-        {
+        for (own, wished, layer) in [
+            (&mut self.fg, requirements.fg, ColorLayer::Foreground),
+            (&mut self.bg, requirements.bg, ColorLayer::Background),
+        ] {
             if let Some(shade) = wished.filter(|shade| shade != own) {
                 separate(list);
                 shade.push(layer, list);
@@ -132,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn what_stays_is_not_sent() {
+    fn unchanged_attributes_are_not_sent() {
         let bold = Pen { modifier: Modifier::BOLD, ..Pen::RESET };
         let red = Pen { fg: TerminalColor::Palette(1), ..bold };
         assert_eq!(turned(red, red), "");
@@ -154,20 +159,21 @@ mod tests {
                 any::<[u8; 3]>().prop_map(TerminalColor::Rgb)
             ]
         };
-        (shade(TerminalColor::Ink), shade(TerminalColor::Ground), any::<u16>()).prop_map(|(fg, bg, bits)| {
-            Pen {
-                fg,
-                bg,
-                // Some terminals cannot have both.
-                modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
-                link: 0,
-            }
-        })
+        (shade(TerminalColor::DefaultForeground), shade(TerminalColor::DefaultBackground), any::<u16>())
+            .prop_map(|(fg, bg, bits)| {
+                Pen {
+                    fg,
+                    bg,
+                    // Some terminals cannot show bold and dim at once.
+                    modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
+                    link: 0,
+                }
+            })
     }
 
     proptest! {
         #[test]
-        fn a_terminal_ends_at_the_pen_wished_for(pens in proptest::collection::vec(pen(), 1..8)) {
+        fn terminal_gets_the_required_pen(pens in proptest::collection::vec(pen(), 1..8)) {
             let side = |length| std::num::NonZero::new(length).expect("not zero");
             let mut parser = vt100::Parser::new(side(1), side(80), 0);
             let mut current = Pen::RESET;
@@ -191,8 +197,8 @@ mod tests {
                     vt100::Color::Idx(index) => TerminalColor::Palette(index),
                     vt100::Color::Rgb(r, g, b) => TerminalColor::Rgb([r, g, b]),
                 };
-                prop_assert_eq!(shade(screen.fgcolor(), TerminalColor::Ink), pen.fg);
-                prop_assert_eq!(shade(screen.bgcolor(), TerminalColor::Ground), pen.bg);
+                prop_assert_eq!(shade(screen.fgcolor(), TerminalColor::DefaultForeground), pen.fg);
+                prop_assert_eq!(shade(screen.bgcolor(), TerminalColor::DefaultBackground), pen.bg);
             }
         }
     }

@@ -1,24 +1,24 @@
-//! The picture: as near to what is wanted as the bytes allow.
+//! Drawing the preview as closely to its target as the byte budget allows.
 
 use super::cell::CellContent;
 use super::cost_model::CostModel;
 use super::cursor_moves::CellPosition;
 use super::fidelity::Fidelity;
-use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, row};
+use super::row_optimizer::{DrawOp, PlannedRow, RowStart, TargetCell, plan_row};
 use super::screen::{ScreenModel, Stroke};
 use super::stable_cells::StableCells;
 use super::target_screen::TargetScreen;
 
-/// Bytes that a cell of a first picture may take, in the mean over the rows so far.
+/// Average bytes per cell that a first preview may take.
 const FIRST_BYTES: u32 = 12;
-/// Bytes at the begin of a row that the search does not count: modifiers of words that are turned off.
+/// Bytes at the start of a row that the search does not count: resetting the modifiers of text.
 const ROW_BYTES: u32 = 4;
-/// Ratio of the price of a byte from one try to the next.
+/// Factor between the byte costs of successive attempts.
 const STEP: f32 = 1.6;
-/// A byte dearer than this buys nothing.
+/// Above this byte cost, nothing more can be saved.
 const DEAREST: f32 = 4000.0;
 
-/// Bytes left for the rows of a first picture.
+/// Byte budget of a first preview.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ByteBudget {
     bytes: u32,
@@ -32,7 +32,8 @@ impl Default for ByteBudget {
 }
 
 impl ByteBudget {
-    /// The row at the least error that the bytes allow. Bytes get cheaper after rows that left some.
+    /// Plans a row with the least error that fits into the budget. The cost of a byte falls again after rows
+    /// that left bytes over.
     fn spend(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
@@ -40,7 +41,7 @@ impl ByteBudget {
             self.model = self.model.at(self.model.byte / STEP);
         }
         loop {
-            let found = row(targets, start, self.model);
+            let found = plan_row(targets, start, self.model);
             let bytes = found.bytes + ROW_BYTES;
             if bytes <= self.bytes || self.model.byte > DEAREST {
                 self.bytes = self.bytes.saturating_sub(bytes);
@@ -51,7 +52,7 @@ impl ByteBudget {
     }
 }
 
-/// Plans the strokes of the picture in a row.
+/// Plans the strokes of the preview in a row.
 pub(super) fn plan(
     screen: &ScreenModel,
     wanted: &TargetScreen,
@@ -66,26 +67,26 @@ pub(super) fn plan(
     let start = RowStart {
         fg: screen.pen.fg,
         bg: screen.pen.bg,
-        is_there: screen.cursor == Some(CellPosition { x: columns.start, y }),
+        is_at_start: screen.cursor == Some(CellPosition { x: columns.start, y }),
     };
     let row = match wanted.fidelity {
-        Fidelity::Still => row(&targets, start, CostModel::EXACT),
-        Fidelity::Following => row(&targets, start, CostModel::ALL),
-        Fidelity::Moving => row(&targets, start, CostModel::MOVING),
+        Fidelity::Still => plan_row(&targets, start, CostModel::EXACT),
+        Fidelity::Following => plan_row(&targets, start, CostModel::ALL),
+        Fidelity::Moving => plan_row(&targets, start, CostModel::MOVING),
         Fidelity::First => budget.spend(&targets, start),
     };
-    let stroke = |dab: DrawOp| Stroke::Mosaic {
-        at: CellPosition { x: columns.start + dab.column as u16, y },
-        glyph: dab.glyph,
-        mosaic: dab.mosaic,
+    let stroke = |op: DrawOp| Stroke::Mosaic {
+        at: CellPosition { x: columns.start + op.column as u16, y },
+        glyph: op.glyph,
+        mosaic: op.mosaic,
         count: 1,
     };
-    let strokes: Vec<Stroke> = row.dabs.into_iter().map(stroke).collect();
+    let strokes: Vec<Stroke> = row.ops.into_iter().map(stroke).collect();
     if can_repeat { Stroke::repeated(&strokes) } else { strokes }
 }
 
 fn target(screen: &ScreenModel, wanted: &TargetScreen, memory: &StableCells, at: CellPosition) -> TargetCell {
-    let shown = match screen.look(at) {
+    let shown = match screen.content(at) {
         CellContent::Mosaic(mosaic) => Some(*mosaic),
         CellContent::Unknown | CellContent::Text(_) | CellContent::Covered => None,
     };

@@ -1,8 +1,8 @@
-//! The cheapest way through a row of the picture.
+//! Finds the cheapest byte sequence that draws a row of the preview.
 //!
-//! A cell can be left as it is or be drawn: by one of four glyphs, with the pen as it is or with one or both of its
-//! colors changed. What that costs depends on the pen and on where the cursor was left, so that the best way
-//! to a cell is kept for each of a few pens (the Viterbi algorithm as a beam search), and the cheapest end is traced back.
+//! Each cell is either kept or drawn with one of four glyphs, changing none, one or both colors of the pen.
+//! The cost depends on the pen and on the cursor position, so the search keeps the best path for each of a
+//! few pens (Viterbi algorithm with beam search) and traces back from the cheapest end.
 
 use super::candidates::{CandidateColors, candidates};
 use super::cell::{Glyph, Mosaic};
@@ -10,61 +10,62 @@ use super::cost_model::CostModel;
 use super::terminal_color::{ColorLayer, TerminalColor, digits};
 use crate::mosaic::{PLACES, Tile};
 
-/// Ways that are kept from cell to cell.
+/// Paths kept per cell.
 const BEAM: usize = 5;
-/// Bytes after which any pen is any other one anywhere: what is this much worse than the best never wins.
+/// Upper bound on the bytes needed to get from any pen and cursor to any other. Paths that are worse than the
+/// best by more cannot win.
 const MOST_BYTES: f32 = 46.0;
 
 /// A cell of the row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TargetCell {
-    /// None: the cell is not of the picture.
+    /// `None` if the cell is not part of the preview.
     pub(super) wanted: Option<Mosaic>,
-    /// None: nothing that could stay.
+    /// `None` if the content is unknown and must be drawn.
     pub(super) shown: Option<Mosaic>,
 }
 
-/// Pen and cursor at the beginning of a row.
+/// Pen and cursor at the start of a row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowStart {
     pub(super) fg: TerminalColor,
     pub(super) bg: TerminalColor,
     /// Whether the cursor is at the first cell.
-    pub(super) is_there: bool,
+    pub(super) is_at_start: bool,
 }
 
-/// One cell drawn.
+/// One drawn cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DrawOp {
-    /// Counted from the first target.
+    /// Relative to the first target cell.
     pub(super) column: usize,
     pub(super) glyph: Glyph,
     pub(super) mosaic: Mosaic,
 }
 
-/// A way through the row up to a cell.
+/// A path through the row up to a cell.
 #[derive(Clone, Copy, Debug)]
 struct DrawPath {
     fg: TerminalColor,
     bg: TerminalColor,
-    /// Both colors as one number.
+    /// Both colors packed into one key.
     pen: u64,
     gap: CursorGap,
     bytes: u32,
-    /// Bytes and errors.
+    /// Bytes and errors, weighted.
     cost: f32,
-    /// Index among the ways to the cell before.
+    /// Index of the path to the previous cell.
     parent: usize,
-    /// None: the cell was left.
+    /// `None` if the cell was kept.
     glyph: Option<Glyph>,
 }
 
-/// Two colors as one number.
+/// Packs two colors into one key.
 fn pen(fg: TerminalColor, bg: TerminalColor) -> u64 {
     u64::from(fg.number()) << 32 | u64::from(bg.number())
 }
 
-/// Cells between the cursor and the next one.
+/// Distance between the cursor and the next cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum CursorGap {
     /// The cursor is in another row.
@@ -90,30 +91,30 @@ impl CursorGap {
     }
 }
 
-/// Strokes of a row.
+/// Draw operations of a row.
 #[derive(Clone, Debug)]
 pub(super) struct PlannedRow {
-    pub(super) dabs: Vec<DrawOp>,
+    pub(super) ops: Vec<DrawOp>,
     pub(super) bytes: u32,
 }
 
-/// The way through the row at the least cost.
-pub(super) fn row(targets: &[TargetCell], start: RowStart, model: CostModel) -> PlannedRow {
-    let gap = if start.is_there { CursorGap::Cells(0) } else { CursorGap::Far };
+/// Finds the cheapest path through a row.
+pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: CostModel) -> PlannedRow {
+    let gap = if start.is_at_start { CursorGap::Cells(0) } else { CursorGap::Far };
     let RowStart { fg, bg, .. } = start;
     let first = DrawPath { fg, bg, pen: pen(fg, bg), gap, bytes: 0, cost: 0.0, parent: 0, glyph: None };
-    let mut ways = vec![vec![first]];
+    let mut paths = vec![vec![first]];
     let wanted: Vec<_> = targets.iter().map(|target| target.wanted).collect();
     for (column, target) in targets.iter().enumerate() {
-        let last = &ways[column];
-        ways.push(step(last, *target, &wanted[column..], model));
+        let last = &paths[column];
+        paths.push(step(last, *target, &wanted[column..], model));
     }
-    trace(&ways, &wanted)
+    trace(&paths, &wanted)
 }
 
-/// The ways on to the next cell.
+/// Extends the paths by one cell.
 fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model: CostModel) -> Vec<DrawPath> {
-    let mut beam = Beam { ways: Vec::with_capacity(BEAM), limit: MOST_BYTES * model.byte };
+    let mut beam = Beam { paths: Vec::with_capacity(BEAM), limit: MOST_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => {
@@ -122,75 +123,81 @@ fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model:
         (Some(_), None) => f32::INFINITY,
     };
     if leave.is_finite() {
-        for (parent, way) in last.iter().enumerate() {
-            beam.add(DrawPath { gap: way.gap.wider(), cost: way.cost + leave, parent, glyph: None, ..*way });
+        for (parent, path) in last.iter().enumerate() {
+            beam.add(DrawPath {
+                gap: path.gap.wider(),
+                cost: path.cost + leave,
+                parent,
+                glyph: None,
+                ..*path
+            });
         }
     }
-    let Some(mosaic) = target.wanted else { return beam.ways };
-    // What is near enough is not worth a new color, but may be drawn again instead of jumped over.
+    let Some(mosaic) = target.wanted else { return beam.paths };
+    // A cell that is close enough is not worth a color change, but it may be redrawn instead of skipped over.
     let changes = if leave <= model.byte { CandidateColors::default() } else { candidates(wanted, model) };
     let changes = ColorChanges::new(&changes, mosaic, model);
-    for (parent, way) in last.iter().enumerate() {
-        changes.turn_one(parent, way, &mut beam);
+    for (parent, path) in last.iter().enumerate() {
+        changes.change_one(parent, path, &mut beam);
     }
-    // Where both colors are set, nothing is left of the pen: the cheapest way goes on.
-    let base = |way: &DrawPath| way.cost + way.gap.bytes() as f32 * model.byte;
-    if let Some((parent, way)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
+    // If both colors are set, the old pen does not matter: extend only the cheapest path.
+    let base = |path: &DrawPath| path.cost + path.gap.bytes() as f32 * model.byte;
+    if let Some((parent, path)) = last.iter().enumerate().min_by(|(_, a), (_, b)| base(a).total_cmp(&base(b)))
     {
-        changes.turn_both(parent, way, &mut beam);
+        changes.change_both(parent, path, &mut beam);
     }
-    beam.ways
+    beam.paths
 }
 
-/// The best ways so far.
+/// The best paths so far.
 struct Beam {
-    ways: Vec<DrawPath>,
-    /// Ways that cost this much more than the best are not kept.
+    paths: Vec<DrawPath>,
+    /// Paths that exceed the best cost by more than this are dropped.
     limit: f32,
 }
 
 impl Beam {
-    fn add(&mut self, way: DrawPath) {
-        let is_same = |other: &DrawPath| other.pen == way.pen && other.gap == way.gap;
-        if let Some(other) = self.ways.iter_mut().find(|other| is_same(other)) {
-            if way.cost < other.cost {
-                *other = way;
+    fn add(&mut self, path: DrawPath) {
+        let is_same = |other: &DrawPath| other.pen == path.pen && other.gap == path.gap;
+        if let Some(other) = self.paths.iter_mut().find(|other| is_same(other)) {
+            if path.cost < other.cost {
+                *other = path;
             }
-        } else if self.ways.len() < BEAM {
-            self.ways.push(way);
-        } else if let Some(worst) = self.ways.iter_mut().max_by(|a, b| a.cost.total_cmp(&b.cost))
-            && way.cost < worst.cost
+        } else if self.paths.len() < BEAM {
+            self.paths.push(path);
+        } else if let Some(worst) = self.paths.iter_mut().max_by(|a, b| a.cost.total_cmp(&b.cost))
+            && path.cost < worst.cost
         {
-            *worst = way;
+            *worst = path;
         }
     }
 
-    /// The cost from which on a way is not worth a look.
+    /// The cost above which a path cannot enter the beam.
     fn bound(&self) -> f32 {
         let (mut best, mut worst) = (f32::INFINITY, 0.0_f32);
-        for way in &self.ways {
-            (best, worst) = (best.min(way.cost), worst.max(way.cost));
+        for path in &self.paths {
+            (best, worst) = (best.min(path.cost), worst.max(path.cost));
         }
-        if self.ways.len() < BEAM { best + self.limit } else { worst.min(best + self.limit) }
+        if self.paths.len() < BEAM { best + self.limit } else { worst.min(best + self.limit) }
     }
 }
 
-/// A color that may be set at a cell, with what follows.
+/// A color that may be set at a cell, with its cost.
 #[derive(Clone, Copy)]
 struct ColorChange {
     shade: TerminalColor,
     /// Bytes of the SGR parameters.
     bytes: u32,
-    /// In the first and the second part.
+    /// Area-weighted error in the first and the second part.
     errors: [f32; 2],
 }
 
-/// Changes that may be drawn at a cell.
+/// Color changes to try at a cell.
 struct ColorChanges {
     mosaic: Mosaic,
     model: CostModel,
     all: Vec<ColorChange>,
-    /// Number of changes of the first part; those of the second part follow.
+    /// End of the colors for the first part; those for the second part follow up to `second`.
     first: usize,
     second: usize,
 }
@@ -209,7 +216,7 @@ impl ColorChanges {
         changes
     }
 
-    /// The errors of a color in both parts, each as large as it is.
+    /// Errors of a color in both parts, weighted by their areas.
     fn errors(&self, shade: TerminalColor) -> [f32; 2] {
         let sizes = self.mosaic.tile.sizes();
         std::array::from_fn(|part| {
@@ -218,15 +225,15 @@ impl ColorChanges {
         })
     }
 
-    /// The ways to draw the cell at the end of a way to it, with the pen as it is or with one other color. A color for
-    /// one part is shown in that one.
-    fn turn_one(&self, parent: usize, way: &DrawPath, beam: &mut Beam) {
-        let mut ends = PathEnd::new(self, parent, way, beam);
+    /// Extends a path with the current pen and with each single color change. A color chosen for one part is
+    /// only used for that part.
+    fn change_one(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
+        let mut ends = PathEnd::new(self, parent, path, beam);
         if !ends.is_near() {
             return;
         }
-        let (fg_errors, bg_errors) = (self.errors(way.fg), self.errors(way.bg));
-        let pen = PenErrors { fg: way.fg, fg_errors, bg: way.bg, bg_errors };
+        let (fg_errors, bg_errors) = (self.errors(path.fg), self.errors(path.bg));
+        let pen = PenErrors { fg: path.fg, fg_errors, bg: path.bg, bg_errors };
         for glyph in Glyph::ALL {
             ends.add(pen, 0, glyph);
         }
@@ -246,9 +253,9 @@ impl ColorChanges {
         }
     }
 
-    /// The same with both colors.
-    fn turn_both(&self, parent: usize, way: &DrawPath, beam: &mut Beam) {
-        let mut ends = PathEnd::new(self, parent, way, beam);
+    /// Extends a path with changes of both colors.
+    fn change_both(&self, parent: usize, path: &DrawPath, beam: &mut Beam) {
+        let mut ends = PathEnd::new(self, parent, path, beam);
         for first in &self.all[..self.first] {
             for second in &self.all[self.first..self.second] {
                 let bytes = first.bytes + second.bytes + 4;
@@ -262,37 +269,37 @@ impl ColorChanges {
     }
 }
 
-/// Ways on from the end of one.
+/// Extension of one path by a drawn cell.
 struct PathEnd<'a> {
     parent: usize,
-    /// With those that lead to the cell.
+    /// Including the bytes that move the cursor to the cell.
     bytes: u32,
-    /// Error of the cells before.
+    /// Error of the previous cells.
     error: f32,
-    /// The price of a byte.
+    /// Cost of a byte.
     byte: f32,
     tile: Tile,
     beam: &'a mut Beam,
-    /// Bound of the beam.
+    /// Current bound of the beam.
     bound: f32,
 }
 
 impl<'a> PathEnd<'a> {
-    fn new(changes: &ColorChanges, parent: usize, way: &DrawPath, beam: &'a mut Beam) -> Self {
+    fn new(changes: &ColorChanges, parent: usize, path: &DrawPath, beam: &'a mut Beam) -> Self {
         let byte = changes.model.byte;
-        let error = way.cost - way.bytes as f32 * byte;
+        let error = path.cost - path.bytes as f32 * byte;
         let bound = beam.bound();
         let tile = changes.mosaic.tile;
-        Self { parent, bytes: way.bytes + way.gap.bytes(), error, byte, tile, beam, bound }
+        Self { parent, bytes: path.bytes + path.gap.bytes(), error, byte, tile, beam, bound }
     }
 
-    /// Whether anything that is drawn here can be worth a look.
+    /// Whether any glyph drawn here could enter the beam.
     fn is_near(&self) -> bool {
         (self.bytes + 1) as f32 * self.byte + self.error < self.bound
     }
 
     fn add(&mut self, ends: PenErrors, sgr: u32, glyph: Glyph) {
-        // Turned round, half of each is another pattern by the same character.
+        // Inverted, the medium shade is a different pattern with the same character.
         if glyph == Glyph::Second && self.tile == Tile::MEDIUM {
             return;
         }
@@ -308,7 +315,7 @@ impl<'a> PathEnd<'a> {
     }
 }
 
-/// A pen, and the errors of its colors in the parts of a cell.
+/// A pen and the errors of its colors in both parts of a cell.
 #[derive(Clone, Copy)]
 struct PenErrors {
     fg: TerminalColor,
@@ -339,25 +346,25 @@ impl PenErrors {
     }
 }
 
-/// The cheapest way back from the last cell.
-fn trace(ways: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow {
-    let last = ways.last().into_iter().flatten().enumerate();
+/// Traces the cheapest path back from the last cell.
+fn trace(paths: &[Vec<DrawPath>], wanted: &[Option<Mosaic>]) -> PlannedRow {
+    let last = paths.last().into_iter().flatten().enumerate();
     let best = last.min_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
-    let (mut index, bytes) = best.map_or((0, 0), |(index, way)| (index, way.bytes));
-    let mut dabs = Vec::new();
-    for (column, ways) in ways.iter().enumerate().skip(1).rev() {
-        let Some(way) = ways.get(index) else { break };
-        if let (Some(glyph), Some(mosaic)) = (way.glyph, wanted[column - 1]) {
+    let (mut index, bytes) = best.map_or((0, 0), |(index, path)| (index, path.bytes));
+    let mut ops = Vec::new();
+    for (column, paths) in paths.iter().enumerate().skip(1).rev() {
+        let Some(path) = paths.get(index) else { break };
+        if let (Some(glyph), Some(mosaic)) = (path.glyph, wanted[column - 1]) {
             let pair = glyph.layers().map(|layer| match layer {
-                ColorLayer::Foreground => way.fg,
-                ColorLayer::Background => way.bg,
+                ColorLayer::Foreground => path.fg,
+                ColorLayer::Background => path.bg,
             });
-            dabs.push(DrawOp { column: column - 1, glyph, mosaic: Mosaic::new(mosaic.tile, pair) });
+            ops.push(DrawOp { column: column - 1, glyph, mosaic: Mosaic::new(mosaic.tile, pair) });
         }
-        index = way.parent;
+        index = path.parent;
     }
-    dabs.reverse();
-    PlannedRow { dabs, bytes }
+    ops.reverse();
+    PlannedRow { ops, bytes }
 }
 
 #[cfg(test)]
@@ -375,53 +382,53 @@ mod tests {
             .iter()
             .map(|halves| TargetCell {
                 wanted: Some(Mosaic::halves(*halves)),
-                shown: Some(Mosaic::plain(TerminalColor::Ground)),
+                shown: Some(Mosaic::plain(TerminalColor::DefaultBackground)),
             })
             .collect()
     }
 
     fn start(fg: TerminalColor, bg: TerminalColor) -> RowStart {
-        RowStart { fg, bg, is_there: true }
+        RowStart { fg, bg, is_at_start: true }
     }
 
     #[test]
-    fn the_pen_is_turned_once_and_blanks_are_preferred() {
-        let found = row(
+    fn pen_changes_once_and_blanks_win() {
+        let found = plan_row(
             &wanted(&[[RED, RED], [RED, RED], [BLACK, RED]]),
-            start(BLACK, TerminalColor::Ground),
+            start(BLACK, TerminalColor::DefaultBackground),
             CostModel::EXACT,
         );
-        let glyphs: Vec<Glyph> = found.dabs.iter().map(|dab| dab.glyph).collect();
+        let glyphs: Vec<Glyph> = found.ops.iter().map(|op| op.glyph).collect();
         assert_eq!(glyphs, [Glyph::Blank, Glyph::Blank, Glyph::First]);
         // ESC [ 48;2;200;0;0 m and the glyphs.
         assert_eq!(found.bytes, 3 + 12 + 1 + 1 + 3);
     }
 
     #[test]
-    fn what_is_shown_is_left_and_jumped_over() {
+    fn unchanged_cells_are_skipped() {
         let mut targets = wanted(&[[RED, BLACK]; 9]);
         for target in &mut targets[1..8] {
             target.shown = Some(Mosaic::halves([RED, TerminalColor::Rgb([1, 1, 1])]));
         }
-        let found = row(&targets, start(RED, BLACK), CostModel::EXACT);
-        let columns: Vec<usize> = found.dabs.iter().map(|dab| dab.column).collect();
+        let found = plan_row(&targets, start(RED, BLACK), CostModel::EXACT);
+        let columns: Vec<usize> = found.ops.iter().map(|op| op.column).collect();
         assert_eq!((columns, found.bytes), (vec![0, 8], 3 + 4 + 3));
-        // A gap of one cell is drawn again, which is no longer than a jump and leaves it nearer to what is wanted.
-        let found = row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), CostModel::EXACT);
-        assert_eq!((found.dabs.len(), found.bytes), (3, 9));
+        // A gap of one cell is redrawn: that takes no more bytes than a jump and is closer to the target.
+        let found = plan_row(&[targets[0], targets[1], targets[8]], start(RED, BLACK), CostModel::EXACT);
+        assert_eq!((found.ops.len(), found.bytes), (3, 9));
     }
 
     #[test]
-    fn colors_that_only_one_layer_has_are_shown_by_it() {
+    fn layer_specific_colors_use_their_layer() {
         for halves in [
-            [RED, TerminalColor::Ground],
-            [TerminalColor::Ground, RED],
-            [TerminalColor::Ink, TerminalColor::Ground],
-            [TerminalColor::Ink; 2],
+            [RED, TerminalColor::DefaultBackground],
+            [TerminalColor::DefaultBackground, RED],
+            [TerminalColor::DefaultForeground, TerminalColor::DefaultBackground],
+            [TerminalColor::DefaultForeground; 2],
         ] {
             let targets = [TargetCell { wanted: Some(Mosaic::halves(halves)), shown: None }];
-            let found = row(&targets, start(BLACK, BLACK), CostModel::MOVING);
-            assert_eq!(found.dabs.first().map(|dab| dab.mosaic.pair), Some(halves));
+            let found = plan_row(&targets, start(BLACK, BLACK), CostModel::MOVING);
+            assert_eq!(found.ops.first().map(|op| op.mosaic.pair), Some(halves));
         }
     }
 
@@ -430,7 +437,7 @@ mod tests {
             4 => (0..4_u8, 0..4_u8).prop_map(|(r, g)| TerminalColor::Rgb([98 + r, 8 + g, 250])),
             2 => any::<[u8; 3]>().prop_map(TerminalColor::Rgb),
             1 => any::<u8>().prop_map(TerminalColor::Palette),
-            1 => Just(TerminalColor::Ground),
+            1 => Just(TerminalColor::DefaultBackground),
         ]
     }
 
@@ -441,15 +448,15 @@ mod tests {
                 .prop_map(|symbol| of_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
-            // As it is read from a character: its first part is in the foreground.
-            let is_cell = tile != Tile::MEDIUM || pair[0] != TerminalColor::Ground;
+            // Normalized as if read from a character: the first part is the foreground.
+            let is_cell = tile != Tile::MEDIUM || pair[0] != TerminalColor::DefaultBackground;
             Mosaic::new(if is_cell { tile } else { Tile::HALVES }, pair)
         })
     }
 
     proptest! {
         #[test]
-        fn every_cell_comes_near_enough(
+        fn every_cell_is_close_to_its_target(
             cells in proptest::collection::vec(
                 (proptest::option::weighted(0.9, mosaic()), proptest::option::of(mosaic())),
                 1..40,
@@ -458,18 +465,18 @@ mod tests {
         ) {
             let targets: Vec<TargetCell> = cells.iter().map(|(wanted, shown)| TargetCell { wanted: *wanted, shown: *shown }).collect();
             let model = if is_exact { CostModel::EXACT } else { CostModel::MOVING };
-            let found = row(&targets, start(TerminalColor::Ink, TerminalColor::Ground), model);
+            let found = plan_row(&targets, start(TerminalColor::DefaultForeground, TerminalColor::DefaultBackground), model);
             let mut screen: Vec<Option<Mosaic>> = targets.iter().map(|target| target.shown).collect();
-            for dab in &found.dabs {
-                prop_assert!(targets[dab.column].wanted.is_some(), "a cell of another's");
-                prop_assert!(dab.glyph.shows(dab.mosaic.pair));
-                screen[dab.column] = Some(dab.mosaic);
+            for op in &found.ops {
+                prop_assert!(targets[op.column].wanted.is_some(), "not part of the preview");
+                prop_assert!(op.glyph.shows(op.mosaic.pair));
+                screen[op.column] = Some(op.mosaic);
             }
             for (shown, target) in screen.iter().zip(&targets) {
                 let Some(wanted) = target.wanted else { continue };
-                let shown = shown.expect("a cell that was unknown is drawn");
+                let shown = shown.expect("unknown cells are drawn");
                 for (shown, wanted, part) in shown.against(wanted) {
-                    // More than that in one channel is worth any bytes.
+                    // A larger error in one channel is worth any number of bytes.
                     let most = if is_exact { 3.0 } else { CostModel::MOVING.byte * 120.0 };
                     prop_assert!(part * model.error(shown, wanted) <= most);
                 }

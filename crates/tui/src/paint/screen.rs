@@ -1,4 +1,4 @@
-//! The terminal's screen, as far as it follows from the bytes that were sent.
+//! A model of the terminal's screen, derived from the bytes sent to it.
 
 use ratatui::layout::Rect;
 
@@ -8,34 +8,35 @@ use super::hyperlinks::{Hyperlinks, LINK_OFF};
 use super::pen::Pen;
 use super::terminal_color::TerminalColor;
 
-/// Bytes that are written in one go.
+/// Bytes that are written together.
 #[derive(Debug)]
 pub(super) struct OutputSlice {
     pub(super) bytes: Vec<u8>,
-    /// It gets no longer than this, unless one cell needs more.
+    /// Maximum length, unless a single cell needs more.
     pub(super) most: usize,
 }
 
-/// A stroke: cells drawn in one go.
+/// Cells drawn with one glyph.
 #[derive(Clone, Debug)]
 pub(super) enum Stroke {
     /// A character.
     Text { at: CellPosition, text: Text },
-    /// Two colors, by a glyph that can show them, in this many cells. More than one: by REP.
+    /// Two colors shown with one glyph in `count` cells, using REP if there are several.
     Mosaic { at: CellPosition, glyph: Glyph, mosaic: Mosaic, count: u16 },
-    /// Blanks of the terminal's own background, this many or, if none, up to the end of the row.
+    /// `count` blanks in the terminal's default background, or up to the end of the row if `None`.
     Erase { at: CellPosition, count: Option<u16> },
 }
 
 impl Stroke {
-    /// Its first place.
+    /// The first cell.
     pub(super) fn at(&self) -> CellPosition {
         match self {
             Self::Text { at, .. } | Self::Mosaic { at, .. } | Self::Erase { at, .. } => *at,
         }
     }
 
-    /// The same strokes with REP in place of equal blanks, if that is shorter. Some terminals repeat ASCII characters only.
+    /// Replaces runs of equal blanks with REP where that is shorter. Only blanks, because some terminals
+    /// repeat ASCII characters only.
     pub(super) fn repeated(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
         for run in strokes.chunk_by(Self::goes_on) {
@@ -51,7 +52,7 @@ impl Stroke {
         shorter
     }
 
-    /// Whether the next stroke is the same in the next cell.
+    /// Whether `next` draws the same in the next cell.
     fn goes_on(&self, next: &Self) -> bool {
         if let (
             Self::Mosaic { at, glyph, mosaic, .. },
@@ -65,14 +66,14 @@ impl Stroke {
     }
 }
 
-/// The cells, the pen and the cursor of the terminal.
+/// Cells, pen and cursor of the terminal.
 #[derive(Debug)]
 pub(super) struct ScreenModel {
     pub(super) columns: u16,
     pub(super) rows: u16,
-    looks: Vec<CellContent>,
+    contents: Vec<CellContent>,
     pub(super) pen: Pen,
-    /// None: anywhere.
+    /// `None` if the position is unknown.
     pub(super) cursor: Option<CellPosition>,
 }
 
@@ -82,13 +83,13 @@ impl ScreenModel {
         Self {
             columns,
             rows,
-            looks: vec![CellContent::BLANK; usize::from(columns) * usize::from(rows)],
+            contents: vec![CellContent::BLANK; usize::from(columns) * usize::from(rows)],
             pen: Pen::RESET,
             cursor: Some(CellPosition { x: 0, y: 0 }),
         }
     }
 
-    /// Appends what makes any screen one that is [`ScreenModel::cleared`].
+    /// Appends the bytes that clear the screen; the result is [`ScreenModel::cleared`].
     pub(super) fn clear(links: &Hyperlinks, slice: &mut OutputSlice) {
         if !links.is_empty() {
             slice.bytes.extend_from_slice(LINK_OFF);
@@ -96,23 +97,23 @@ impl ScreenModel {
         slice.bytes.extend_from_slice(b"\x1b[0m\x1b[2J\x1b[H");
     }
 
-    pub(super) fn look(&self, at: CellPosition) -> &CellContent {
-        &self.looks[self.index(at)]
+    pub(super) fn content(&self, at: CellPosition) -> &CellContent {
+        &self.contents[self.index(at)]
     }
 
-    /// Whether drawing has left cells of a row in a state that nobody knows.
+    /// Whether a row has cells with unknown content.
     pub(super) fn is_damaged(&self, y: u16) -> bool {
         let start = self.index(CellPosition { x: 0, y });
-        self.looks[start..start + usize::from(self.columns)].contains(&CellContent::Unknown)
+        self.contents[start..start + usize::from(self.columns)].contains(&CellContent::Unknown)
     }
 
-    /// Nobody knows what these cells show.
+    /// Marks the content of these cells as unknown.
     pub(super) fn damage(&mut self, cells: Rect) {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for y in cells.top()..cells.bottom() {
             for x in cells.left()..cells.right() {
                 let index = self.index(CellPosition { x, y });
-                self.looks[index] = CellContent::Unknown;
+                self.contents[index] = CellContent::Unknown;
             }
         }
     }
@@ -121,7 +122,7 @@ impl ScreenModel {
         usize::from(at.y) * usize::from(self.columns) + usize::from(at.x)
     }
 
-    /// False: there is no room for it, and nothing was done.
+    /// Draws a stroke. Returns false, without any effect, if it does not fit into the slice.
     pub(super) fn draw(&mut self, stroke: &Stroke, links: &Hyperlinks, slice: &mut OutputSlice) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
         self.write(stroke, links, &mut slice.bytes);
@@ -135,17 +136,19 @@ impl ScreenModel {
     }
 
     fn write(&mut self, stroke: &Stroke, links: &Hyperlinks, bytes: &mut Vec<u8>) {
-        let (at, wish) = match stroke {
+        let (at, requirements) = match stroke {
             Stroke::Text { at, text } => (at, text.pen.exactly()),
-            Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.wish(mosaic.pair)),
-            Stroke::Erase { at, .. } => (at, Glyph::Blank.wish([TerminalColor::Ground; 2])),
+            Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.requirements(mosaic.pair)),
+            Stroke::Erase { at, .. } => {
+                (at, Glyph::Blank.requirements([TerminalColor::DefaultBackground; 2]))
+            }
         };
         cursor_moves::go(self.cursor, *at, bytes);
-        if self.pen.link != wish.link {
-            links.open(wish.link, bytes);
-            self.pen.link = wish.link;
+        if self.pen.link != requirements.link {
+            links.open(requirements.link, bytes);
+            self.pen.link = requirements.link;
         }
-        self.pen.turn(&wish, bytes);
+        self.pen.turn(&requirements, bytes);
         match stroke {
             Stroke::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
             Stroke::Mosaic { glyph, mosaic, count, .. } => {
@@ -160,12 +163,12 @@ impl ScreenModel {
         }
     }
 
-    /// Notes the cells and the cursor after a stroke.
+    /// Updates cells and cursor after a stroke.
     fn keep(&mut self, stroke: &Stroke) {
         match stroke {
             Stroke::Text { at, text } => {
                 self.put(*at, CellContent::Text(text.clone()), text.columns);
-                // Terminals differ in how wide they think that others are.
+                // Terminals disagree about the width of other characters.
                 self.cursor = if text.is_plain() { self.after(*at, 1) } else { None };
             }
             Stroke::Mosaic { at, mosaic, count, .. } => {
@@ -183,22 +186,22 @@ impl ScreenModel {
         }
     }
 
-    /// The cursor after so many columns; behind the last one it may be anywhere.
+    /// The cursor after `columns` columns; `None` past the last one, where terminals differ.
     fn after(&self, at: CellPosition, columns: u16) -> Option<CellPosition> {
         Some(CellPosition { x: at.x + columns, ..at }).filter(|next| next.x < self.columns)
     }
 
-    /// Keeps what was drawn. Half of a character that was two columns wide is gone as a whole.
+    /// Stores a drawn cell. Overwriting half of a wide character makes the other half unknown.
     fn put(&mut self, at: CellPosition, look: CellContent, columns: u16) {
         let start = self.index(at);
         let end = start + usize::from(columns);
-        if self.looks[start] == CellContent::Covered && start > 0 {
-            self.looks[start - 1] = CellContent::Unknown;
+        if self.contents[start] == CellContent::Covered && start > 0 {
+            self.contents[start - 1] = CellContent::Unknown;
         }
-        self.looks[start] = look;
-        self.looks[start + 1..end].fill(CellContent::Covered);
-        if at.x + columns < self.columns && self.looks[end] == CellContent::Covered {
-            self.looks[end] = CellContent::Unknown;
+        self.contents[start] = look;
+        self.contents[start + 1..end].fill(CellContent::Covered);
+        if at.x + columns < self.columns && self.contents[end] == CellContent::Covered {
+            self.contents[end] = CellContent::Unknown;
         }
     }
 }

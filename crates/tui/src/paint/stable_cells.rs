@@ -1,8 +1,7 @@
-//! Memory of the cells that an edit did not change.
+//! Keeps converged cells on the screen where an edit changed nothing.
 //!
-//! The first pictures of two requests have the same random numbers, so that they differ only where the scene does. A cell that is
-//! alike in both keeps its look on the screen, which has converged, through all the noise until the new picture has converged
-//! too.
+//! The first previews of two requests use the same random numbers, so they differ only where the scene does.
+//! A cell that is equal in both keeps its converged look until the new render has converged as well.
 
 use ratatui::layout::Rect;
 
@@ -13,28 +12,28 @@ use super::screen::ScreenModel;
 use super::target_screen::TargetScreen;
 use super::terminal_color::TerminalColor;
 
-/// First pictures are alike where no channel differs by more.
+/// Maximum channel difference between equal first previews.
 const ALIKE: u8 = 2;
-/// Noise that a cell is left in spite of is no larger than this.
+/// Cells are not redrawn for noise below this threshold.
 const MOST_NOISE: u8 = 12;
 
-/// The first picture of the request that the screen shows, cell by cell.
+/// The first preview of the request that the screen shows, per cell.
 #[derive(Debug, Default)]
 pub(super) struct StableCells {
     columns: usize,
     picture: Rect,
-    /// None: nothing is known.
+    /// `None` if unknown.
     firsts: Vec<Option<Mosaic>>,
-    /// The first picture of the request under way; empty: it had none.
+    /// The first preview of the current request; empty if there was none.
     newest: Vec<Option<Mosaic>>,
-    /// Whether the cell is alike in the first pictures of the request under way and of the one that it shows.
+    /// Whether the cell is equal in the first previews of the current request and of the one on the screen.
     steady: Vec<bool>,
-    /// Greatest difference between the requested and the shown cell that counts as noise, in steady parts.
+    /// Maximum difference between a stable cell and its target that counts as noise.
     noise: u8,
 }
 
 impl StableCells {
-    /// Nothing of what is on the screen is known.
+    /// Marks the whole screen as unknown.
     pub(super) fn forget(&mut self) {
         self.firsts.fill(None);
         self.steady.fill(false);
@@ -55,7 +54,7 @@ impl StableCells {
             Fidelity::First => self.begin(wanted),
             Fidelity::Moving => self.noise = noise(self.median(wanted, screen)),
             Fidelity::Following => match self.median(wanted, screen) {
-                // There is hardly any left to hide.
+                // There is hardly any noise left to hide.
                 ..=1 => self.steady.fill(false),
                 median => self.noise = noise(median),
             },
@@ -63,7 +62,7 @@ impl StableCells {
         }
     }
 
-    /// A request shows its first picture.
+    /// Compares the first preview of a new request with the previous one.
     fn begin(&mut self, wanted: &TargetScreen) {
         let places = (0..wanted.rows).flat_map(|y| (0..wanted.columns).map(move |x| (x, y)));
         self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();
@@ -73,7 +72,7 @@ impl StableCells {
         }
     }
 
-    /// The median of how far what is wanted is off the cells that did not change.
+    /// Median difference between the target and the stable cells on the screen.
     fn median(&self, wanted: &TargetScreen, screen: Option<&ScreenModel>) -> usize {
         let mut counts = [0_u32; 256];
         let Some(screen) = screen else { return 0 };
@@ -81,7 +80,7 @@ impl StableCells {
             for x in wanted.picture.left()..wanted.picture.right() {
                 if let (true, CellContent::Mosaic(shown), Some(wanted)) = (
                     self.is_steady(CellPosition { x, y }),
-                    screen.look(CellPosition { x, y }),
+                    screen.content(CellPosition { x, y }),
                     wanted.mosaic(x, y),
                 ) {
                     counts[usize::from(apart(*shown, wanted))] += 1;
@@ -97,7 +96,7 @@ impl StableCells {
         median.count()
     }
 
-    /// The mosaic for a cell: the one already shown, if only noise separates it from the requested one.
+    /// The mosaic to draw: the one already shown if it differs from the target only by noise.
     pub(super) fn mosaic(&self, at: CellPosition, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
         shown
             .filter(|shown| {
@@ -114,7 +113,7 @@ impl StableCells {
         usize::from(at.y) * self.columns + usize::from(at.x)
     }
 
-    /// Cells of the picture were drawn for the request under way.
+    /// Records that cells were drawn for the current request.
     pub(super) fn drawn(&mut self, at: CellPosition, count: u16) {
         let first = self.index(at);
         for index in first..first + usize::from(count) {
@@ -125,8 +124,7 @@ impl StableCells {
         }
     }
 
-    /// All that had to be drawn of the picture in a row was drawn: the cells that were left show the request under
-    /// way as well.
+    /// Records that a row is complete: the cells that were not drawn show the current request as well.
     pub(super) fn row_done(&mut self, y: u16) {
         for x in self.picture.left()..self.picture.right() {
             let index = self.index(CellPosition { x, y });
@@ -138,18 +136,18 @@ impl StableCells {
         }
     }
 
-    /// The picture is shown as it stays: what comes next is another request's.
+    /// Ends the current request: its final preview is on the screen.
     pub(super) fn finish(&mut self) {
         self.newest.clear();
     }
 }
 
-/// The noise not worth drawing, if the median difference is this.
+/// Noise threshold for a median difference.
 fn noise(median: usize) -> u8 {
     u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MOST_NOISE)
 }
 
-/// The largest difference of a channel; 255 if the mosaics cannot be compared.
+/// The largest channel difference; 255 if the colors cannot be compared.
 fn apart(a: Mosaic, b: Mosaic) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,

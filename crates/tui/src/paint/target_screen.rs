@@ -1,4 +1,4 @@
-//! The cells that the painter is aimed at.
+//! The target of the painter.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -7,30 +7,30 @@ use super::cell::{CellContent, Mosaic};
 use super::fidelity::Fidelity;
 use crate::color::ColorDepth;
 
-/// A screen that is wanted.
+/// The cells that the screen should show.
 #[derive(Debug)]
 pub(super) struct TargetScreen {
     pub(super) columns: u16,
     pub(super) rows: u16,
-    looks: Vec<CellContent>,
+    contents: Vec<CellContent>,
     pub(super) picture: Rect,
-    /// Words in these cells come after the picture.
+    /// Text in these cells is drawn after the preview.
     pub(super) later: Rect,
     pub(super) fidelity: Fidelity,
     depth: ColorDepth,
 }
 
-/// Parts of the screen, in the order in which they are drawn.
+/// Regions of the screen, in drawing order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ScreenRegion {
     Words,
     Picture,
-    /// Words that wait for the picture.
+    /// Text that is drawn after the preview.
     Later,
 }
 
 impl TargetScreen {
-    /// Nothing at all.
+    /// An empty screen.
     pub(super) fn nothing(depth: ColorDepth) -> Self {
         Self::new(&Buffer::empty(Rect::ZERO), Rect::ZERO, Fidelity::Still, depth)
     }
@@ -38,19 +38,19 @@ impl TargetScreen {
     pub(super) fn new(buffer: &Buffer, picture: Rect, fidelity: Fidelity, depth: ColorDepth) -> Self {
         let (columns, rows) = (buffer.area.width, buffer.area.height);
         let picture = picture.intersection(Rect::new(0, 0, columns, rows));
-        Self { columns, rows, looks: looks(buffer, depth), picture, later: Rect::ZERO, fidelity, depth }
+        Self { columns, rows, contents: contents(buffer, depth), picture, later: Rect::ZERO, fidelity, depth }
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.looks.is_empty()
+        self.contents.is_empty()
     }
 
     pub(super) fn row(&self, y: u16) -> &[CellContent] {
         let columns = usize::from(self.columns);
-        &self.looks[usize::from(y) * columns..][..columns]
+        &self.contents[usize::from(y) * columns..][..columns]
     }
 
-    /// Whether a row that shows this picture shows that one as well.
+    /// Whether a row drawn for this target also satisfies `other`.
     pub(super) fn serves(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
             || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
@@ -61,7 +61,7 @@ impl TargetScreen {
             && self.row(y).get(columns.clone()) == other.row(y).get(columns)
     }
 
-    /// The colors of a cell of the picture; none of words, which may lie over it.
+    /// The mosaic of a preview cell. `None` for text, which may cover the preview.
     pub(super) fn mosaic(&self, x: u16, y: u16) -> Option<Mosaic> {
         match self.row(y)[usize::from(x)] {
             CellContent::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
@@ -71,23 +71,23 @@ impl TargetScreen {
         }
     }
 
-    /// Words in these cells come after the picture; what is blank does not wait.
+    /// Sets the cells whose text is drawn after the preview. Blank cells are not delayed.
     pub(super) fn with_later(self, later: Rect) -> Self {
         Self { later, ..self }
     }
 
-    /// The characters of these cells belong to a link.
+    /// Makes the text in these cells part of a hyperlink.
     pub(super) fn link(&mut self, cells: Rect, number: u16) {
         let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
         for place in cells.positions() {
             let index = usize::from(place.y) * usize::from(self.columns) + usize::from(place.x);
-            if let CellContent::Text(text) = &mut self.looks[index] {
+            if let CellContent::Text(text) = &mut self.contents[index] {
                 text.pen.link = number;
             }
         }
     }
 
-    /// The part of the screen that a cell belongs to.
+    /// The region that a cell belongs to.
     pub(super) fn region(&self, x: u16, y: u16) -> ScreenRegion {
         match () {
             () if self.is_picture(x, y) => ScreenRegion::Picture,
@@ -97,7 +97,7 @@ impl TargetScreen {
         }
     }
 
-    /// Whether a cell belongs to the picture, be it of two colors or, without colors, a character.
+    /// Whether a cell belongs to the preview: a mosaic or, without colors, a ramp character.
     pub(super) fn is_picture(&self, x: u16, y: u16) -> bool {
         let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
         self.picture.contains((x, y).into())
@@ -108,12 +108,12 @@ impl TargetScreen {
             }
     }
 
-    /// Whether the picture is made of characters.
+    /// Whether the preview is drawn with characters.
     pub(super) fn is_ramp(&self) -> bool {
         self.depth == ColorDepth::None
     }
 
-    /// The rows of the picture, the middle one first.
+    /// The rows of the preview, from the middle outwards.
     pub(super) fn rows_from_the_middle(&self) -> impl Iterator<Item = u16> + use<> {
         let (top, bottom) = (self.picture.top(), self.picture.bottom());
         let middle = top + (bottom - top) / 2;
@@ -125,12 +125,12 @@ impl TargetScreen {
     }
 }
 
-/// Looks of a buffer's cells.
-pub(super) fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
+/// Contents of the cells of a buffer.
+pub(super) fn contents(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
     let columns = usize::from(buffer.area.width.max(1));
-    let mut looks: Vec<CellContent> =
+    let mut contents: Vec<CellContent> =
         buffer.content.iter().map(|cell| CellContent::of(cell, depth)).collect();
-    for row in looks.chunks_mut(columns) {
+    for row in contents.chunks_mut(columns) {
         let mut x = 0;
         while x < row.len() {
             let end = x + usize::from(row[x].columns());
@@ -142,5 +142,5 @@ pub(super) fn looks(buffer: &Buffer, depth: ColorDepth) -> Vec<CellContent> {
             x = end;
         }
     }
-    looks
+    contents
 }

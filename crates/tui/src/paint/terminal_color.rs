@@ -1,23 +1,23 @@
-//! The colors of a terminal.
+//! Colors of cells as the terminal stores them.
 
 use ratatui::style::Color;
 
 use crate::color::fixed;
 
-/// A color as the terminal knows it.
+/// A color of the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum TerminalColor {
-    /// The terminal's own background.
-    Ground,
-    /// The terminal's own foreground.
-    Ink,
-    /// One of the palette. The first 16 are the user's, the others a cube and grays.
+    /// The default background.
+    DefaultBackground,
+    /// The default foreground.
+    DefaultForeground,
+    /// A palette entry. The user chooses the first 16; the others are the color cube and the grays.
     Palette(u8),
-    /// Red, green, blue in sRGB.
+    /// An sRGB color.
     Rgb([u8; 3]),
 }
 
-/// The two colors of a cell.
+/// The two color layers of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorLayer {
     Foreground,
@@ -25,12 +25,12 @@ pub(super) enum ColorLayer {
 }
 
 impl TerminalColor {
-    /// The shade of a cell's color in this layer.
+    /// The terminal color for a ratatui color in this layer.
     pub(super) fn of(color: Color, layer: ColorLayer) -> Self {
         match color {
             Color::Reset => match layer {
-                ColorLayer::Foreground => Self::Ink,
-                ColorLayer::Background => Self::Ground,
+                ColorLayer::Foreground => Self::DefaultForeground,
+                ColorLayer::Background => Self::DefaultBackground,
             },
             Color::Black => Self::Palette(0),
             Color::Red => Self::Palette(1),
@@ -53,42 +53,42 @@ impl TerminalColor {
         }
     }
 
-    /// Whether this layer can have it.
+    /// Whether the color can be used in this layer.
     pub(super) fn fits(self, layer: ColorLayer) -> bool {
         match self {
-            Self::Ground => layer == ColorLayer::Background,
-            Self::Ink => layer == ColorLayer::Foreground,
+            Self::DefaultBackground => layer == ColorLayer::Background,
+            Self::DefaultForeground => layer == ColorLayer::Foreground,
             Self::Palette(_) | Self::Rgb(_) => true,
         }
     }
 
-    /// A number that no other shade has.
+    /// A unique number for each color.
     pub(super) fn number(self) -> u32 {
         match self {
-            Self::Ground => 1 << 24,
-            Self::Ink => 2 << 24,
+            Self::DefaultBackground => 1 << 24,
+            Self::DefaultForeground => 2 << 24,
             Self::Palette(index) => 3 << 24 | u32::from(index),
             Self::Rgb([r, g, b]) => u32::from_be_bytes([0, r, g, b]),
         }
     }
 
-    /// sRGB values, if they are known.
+    /// The sRGB value, if it is known.
     pub(super) fn rgb(self) -> Option<[u8; 3]> {
         match self {
             Self::Rgb(rgb) => Some(rgb),
             Self::Palette(index) => fixed(index),
-            Self::Ground | Self::Ink => None,
+            Self::DefaultBackground | Self::DefaultForeground => None,
         }
     }
 
-    /// Appends the parameters of SGR that set it in this layer, which must be one that it fits.
+    /// Appends the SGR parameters that set the color. It must fit the layer.
     pub(super) fn push(self, layer: ColorLayer, out: &mut Vec<u8>) {
         let base = match layer {
             ColorLayer::Foreground => 30,
             ColorLayer::Background => 40,
         };
         match self {
-            Self::Ground | Self::Ink => push_number(base + 9, out),
+            Self::DefaultBackground | Self::DefaultForeground => push_number(base + 9, out),
             Self::Palette(index @ 0..8) => push_number(base + u16::from(index), out),
             Self::Palette(index @ 8..16) => push_number(base + 52 + u16::from(index), out),
             Self::Palette(index) => push_list(&[base + 8, 5, u16::from(index)], out),
@@ -98,11 +98,11 @@ impl TerminalColor {
         }
     }
 
-    /// Bytes that [`TerminalColor::push`] appends.
+    /// Number of bytes that [`TerminalColor::push`] appends.
     pub(super) fn length(self) -> u32 {
         match self {
-            Self::Ground | Self::Ink | Self::Palette(0..8) => 2,
-            // 90 to 97, but 100 to 107: the mean is of no use, the larger one is.
+            Self::DefaultBackground | Self::DefaultForeground | Self::Palette(0..8) => 2,
+            // 90 to 97 or 100 to 107: an upper bound, because the layer is not known here.
             Self::Palette(8..16) => 3,
             Self::Palette(index) => 5 + digits(index),
             Self::Rgb(rgb) => 7 + rgb.map(digits).iter().sum::<u32>(),
@@ -110,12 +110,12 @@ impl TerminalColor {
     }
 }
 
-/// Decimal digits of a number.
+/// Number of decimal digits.
 pub(super) fn digits(number: u8) -> u32 {
     1 + u32::from(number > 9) + u32::from(number > 99)
 }
 
-/// Appends a number in decimal digits.
+/// Appends a decimal number.
 pub(super) fn push_number(number: u16, out: &mut Vec<u8>) {
     if number > 9 {
         push_number(number / 10, out);
@@ -123,7 +123,7 @@ pub(super) fn push_number(number: u16, out: &mut Vec<u8>) {
     out.push(b'0' + (number % 10) as u8);
 }
 
-/// Appends numbers with semicolons between them.
+/// Appends numbers separated by semicolons.
 fn push_list(numbers: &[u16], out: &mut Vec<u8>) {
     for (i, number) in numbers.iter().enumerate() {
         if i > 0 {
@@ -144,10 +144,10 @@ mod tests {
     }
 
     #[test]
-    fn parameters_are_those_of_ecma_48_and_xterm() {
+    fn sgr_parameters_match_ecma_48_and_xterm() {
         use ColorLayer::{Background, Foreground};
-        assert_eq!(text(TerminalColor::Ink, Foreground), "39");
-        assert_eq!(text(TerminalColor::Ground, Background), "49");
+        assert_eq!(text(TerminalColor::DefaultForeground, Foreground), "39");
+        assert_eq!(text(TerminalColor::DefaultBackground, Background), "49");
         assert_eq!(text(TerminalColor::Palette(3), Foreground), "33");
         assert_eq!(text(TerminalColor::Palette(3), Background), "43");
         assert_eq!(text(TerminalColor::Palette(8), Foreground), "90");
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_are_those_of_the_parameters() {
+    fn length_matches_the_written_parameters() {
         for shade in (16..=255)
             .map(TerminalColor::Palette)
             .chain([TerminalColor::Rgb([0, 10, 100]), TerminalColor::Rgb([9, 99, 255])])
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_palette_is_that_of_xterm() {
+    fn fixed_colors_match_xterm() {
         assert_eq!(TerminalColor::Palette(16).rgb(), Some([0, 0, 0]));
         assert_eq!(TerminalColor::Palette(67).rgb(), Some([95, 135, 175]));
         assert_eq!(TerminalColor::Palette(231).rgb(), Some([255, 255, 255]));

@@ -1,4 +1,4 @@
-//! Tests: a terminal that is fed with the slices shows the picture that the painter was aimed at.
+//! Tests that a terminal fed with the painter's slices shows the target.
 
 use proptest::prelude::*;
 use ratatui::buffer::Buffer;
@@ -6,13 +6,13 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier};
 
 use super::cell::CellContent;
-use super::target_screen::looks;
+use super::target_screen::contents;
 use super::terminal_color::TerminalColor;
 use super::*;
 
 mod pictures;
 
-/// A terminal with a painter in front of it.
+/// A painter and the terminal it draws on.
 struct TestTerminal {
     painter: Painter,
     terminal: vt100::Parser,
@@ -30,29 +30,29 @@ impl TestTerminal {
         Self { painter: Painter::new(depth).repeating(can_repeat), terminal, sent: 0 }
     }
 
-    /// Sends one slice; whether there was one.
+    /// Sends one slice. Returns whether there was one.
     fn slice(&mut self, most_bytes: usize) -> bool {
         let bytes = self.painter.slice(most_bytes);
-        // One cell: a move, a pen with all its modifiers, a symbol.
+        // A single cell needs a cursor move, a pen with all modifiers and a symbol.
         assert!(bytes.len() <= most_bytes.max(96), "{} for {most_bytes}", bytes.len());
         self.terminal.process(&bytes);
         self.sent += bytes.len();
         !bytes.is_empty()
     }
 
-    /// Sends everything; how many bytes that was.
+    /// Sends everything and returns the number of bytes.
     fn finish(&mut self, most_bytes: usize) -> usize {
         let before = self.sent;
         while self.slice(most_bytes) {}
         self.sent - before
     }
 
-    /// The largest difference of a channel between the screen and a buffer; panics where more than colors of
-    /// the picture differs.
+    /// The largest channel difference between the screen and a buffer. Panics if anything but colors of the
+    /// preview differs.
     fn difference(&self, wanted: &Buffer, depth: ColorDepth) -> u32 {
         let mut largest = 0;
-        let looks = looks(wanted, depth);
-        for (i, look) in looks.iter().enumerate() {
+        let contents = contents(wanted, depth);
+        for (i, look) in contents.iter().enumerate() {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
             match (look, shown(cell)) {
@@ -69,7 +69,7 @@ impl TestTerminal {
     }
 }
 
-/// None: they cannot be compared.
+/// `None` if the colors cannot be compared.
 fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     if a == b {
         return Some(0);
@@ -78,7 +78,7 @@ fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
     a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(b))).max()
 }
 
-/// Look of a terminal's cell. Its parser knows fewer modifiers.
+/// The content of a terminal cell. vt100 knows fewer modifiers.
 fn shown(cell: &vt100::Cell) -> CellContent {
     if cell.is_wide_continuation() {
         return CellContent::Covered;
@@ -107,7 +107,7 @@ const COLUMNS: u16 = 24;
 const ROWS: u16 = 8;
 const PICTURE: Rect = Rect { x: 3, y: 1, width: 17, height: 6 };
 
-/// One cell: a symbol, colors, modifiers.
+/// Symbol, colors and modifiers of a cell.
 #[derive(Clone, Debug)]
 struct CellStyle {
     symbol: &'static str,
@@ -123,7 +123,7 @@ fn color() -> impl Strategy<Value = Color> {
         Just(Color::White),
         (0..=255_u8).prop_map(Color::Indexed),
         any::<[u8; 3]>().prop_map(|[r, g, b]| Color::Rgb(r, g, b)),
-        // Few colors close to each other.
+        // A few similar colors.
         (0..3_u8, 0..3_u8).prop_map(|(r, g)| Color::Rgb(98 + r, 8 + g, 250)),
     ]
 }
@@ -153,7 +153,7 @@ fn ink() -> impl Strategy<Value = CellStyle> {
 
 fn buffer() -> impl Strategy<Value = Buffer> {
     let cells = usize::from(COLUMNS) * usize::from(ROWS);
-    // Cells of few kinds, so that neighbors are often the same.
+    // Few distinct cells, so that neighbors are often equal.
     (proptest::collection::vec(ink(), 1..12), proptest::collection::vec(any::<u8>(), cells)).prop_map(
         |(inks, choice)| {
             let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
@@ -180,20 +180,20 @@ fn fidelity() -> impl Strategy<Value = Fidelity> {
     proptest::sample::select(vec![Fidelity::First, Fidelity::Moving, Fidelity::Still])
 }
 
-/// Something that happens to a painter.
+/// A step of a painter test.
 #[derive(Clone, Debug)]
 enum PainterStep {
     Aim(Buffer, Fidelity),
-    OutputSlice(usize),
+    Slice(usize),
     Forget,
-    /// Another program writes on the screen, and the painter hears of it.
+    /// Another program writes to the screen and the painter is told.
     Litter,
 }
 
 fn step() -> impl Strategy<Value = PainterStep> {
     prop_oneof![
         3 => (buffer(), fidelity()).prop_map(|(buffer, fidelity)| PainterStep::Aim(buffer, fidelity)),
-        4 => (0..600_usize).prop_map(PainterStep::OutputSlice),
+        4 => (0..600_usize).prop_map(PainterStep::Slice),
         1 => Just(PainterStep::Forget),
         1 => Just(PainterStep::Litter),
     ]
@@ -201,61 +201,61 @@ fn step() -> impl Strategy<Value = PainterStep> {
 
 proptest! {
     #[test]
-    fn a_still_picture_is_shown_exactly_whatever_was_before(
+    fn final_preview_is_exact_after_any_history(
         steps in proptest::collection::vec(step(), 0..12),
         last in buffer(),
         most_bytes in 1..400_usize,
         depth in depth(),
         can_repeat in any::<bool>(),
     ) {
-        let mut ui = TestTerminal::repeating(COLUMNS, ROWS, depth, can_repeat);
+        let mut test = TestTerminal::repeating(COLUMNS, ROWS, depth, can_repeat);
         for step in steps {
             match step {
-                PainterStep::Aim(buffer, fidelity) => ui.painter.aim(&buffer, PICTURE, fidelity),
-                PainterStep::OutputSlice(most_bytes) => {
-                    ui.slice(most_bytes);
+                PainterStep::Aim(buffer, fidelity) => test.painter.aim(&buffer, PICTURE, fidelity),
+                PainterStep::Slice(most_bytes) => {
+                    test.slice(most_bytes);
                 }
-                PainterStep::Forget => ui.painter.forget(),
+                PainterStep::Forget => test.painter.forget(),
                 PainterStep::Litter => {
-                    ui.terminal.process(b"\x1b[7;31;44mshell$ \x1b[5;5Hx\n\n\n\n\n\n\n");
-                    ui.painter.forget();
+                    test.terminal.process(b"\x1b[7;31;44mshell$ \x1b[5;5Hx\n\n\n\n\n\n\n");
+                    test.painter.forget();
                 }
             }
         }
-        ui.painter.aim(&last, PICTURE, Fidelity::Still);
-        ui.finish(most_bytes);
-        let largest = ui.difference(&last, depth);
+        test.painter.aim(&last, PICTURE, Fidelity::Still);
+        test.finish(most_bytes);
+        let largest = test.difference(&last, depth);
         prop_assert!(largest <= 1, "{largest}");
-        ui.painter.aim(&last, PICTURE, Fidelity::Still);
-        prop_assert_eq!(ui.finish(most_bytes), 0, "nothing is sent for what is shown");
+        test.painter.aim(&last, PICTURE, Fidelity::Still);
+        prop_assert_eq!(test.finish(most_bytes), 0, "an up-to-date screen needs no bytes");
     }
 
     #[test]
-    fn words_are_exact_at_every_fidelity(buffers in proptest::collection::vec((buffer(), fidelity()), 1..5), depth in depth()) {
-        let mut ui = TestTerminal::new(COLUMNS, ROWS, depth);
+    fn text_is_exact_at_every_fidelity(buffers in proptest::collection::vec((buffer(), fidelity()), 1..5), depth in depth()) {
+        let mut test = TestTerminal::new(COLUMNS, ROWS, depth);
         for (buffer, fidelity) in buffers {
-            ui.painter.aim(&buffer, Rect::ZERO, fidelity);
-            ui.finish(100);
-            prop_assert_eq!(ui.difference(&buffer, depth), 0);
+            test.painter.aim(&buffer, Rect::ZERO, fidelity);
+            test.finish(100);
+            prop_assert_eq!(test.difference(&buffer, depth), 0);
         }
     }
 }
 
 #[test]
-fn another_size_is_a_new_screen() {
-    let mut ui = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
+fn resize_starts_a_new_screen() {
+    let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
     for (columns, rows) in [(COLUMNS, ROWS), (10, 3), (24, 6), (1, 1)] {
         let area = Rect::new(0, 0, columns, rows);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, "words", ratatui::style::Style::new());
-        ui.painter.aim(&buffer, area, Fidelity::Still);
-        ui.finish(1000);
-        assert_eq!(ui.difference(&buffer, ColorDepth::TrueColor), 0);
+        test.painter.aim(&buffer, area, Fidelity::Still);
+        test.finish(1000);
+        assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
     }
 }
 
 #[test]
-fn words_come_before_the_picture_and_the_picture_from_its_middle() {
+fn text_is_drawn_first_then_middle_rows() {
     let area = Rect::new(0, 0, 30, 9);
     let mut buffer = Buffer::empty(area);
     let picture = Rect::new(2, 1, 20, 7);
@@ -269,15 +269,15 @@ fn words_come_before_the_picture_and_the_picture_from_its_middle() {
     }
     buffer.set_string(0, 8, "words", ratatui::style::Style::new());
     buffer.set_string(5, 3, "over_it", ratatui::style::Style::reset());
-    let mut ui = TestTerminal::new(30, 9, ColorDepth::TrueColor);
-    ui.painter.aim(&buffer, picture, Fidelity::Still);
-    ui.slice(100);
+    let mut test = TestTerminal::new(30, 9, ColorDepth::TrueColor);
+    test.painter.aim(&buffer, picture, Fidelity::Still);
+    test.slice(100);
     let row =
-        |ui: &TestTerminal, y: u16| ui.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
-    assert_eq!((row(&ui, 8), row(&ui, 3)), ("words".to_owned(), "     over_it".to_owned()));
+        |test: &TestTerminal, y: u16| test.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
+    assert_eq!((row(&test, 8), row(&test, 3)), ("words".to_owned(), "     over_it".to_owned()));
     let mut order = Vec::new();
-    while ui.slice(100) {
-        let is_drawn = |y: &u16| row(&ui, *y).ends_with('▀');
+    while test.slice(100) {
+        let is_drawn = |y: &u16| row(&test, *y).ends_with('▀');
         let new: Vec<u16> = (1..8).filter(is_drawn).filter(|y| !order.contains(y)).collect();
         order.extend(new);
     }
@@ -285,7 +285,7 @@ fn words_come_before_the_picture_and_the_picture_from_its_middle() {
 }
 
 #[test]
-fn a_painter_that_was_not_aimed_says_nothing() {
+fn painter_without_target_sends_nothing() {
     let mut painter = Painter::new(ColorDepth::TrueColor);
     assert_eq!(painter.slice(1000), b"");
     painter.forget();
@@ -293,46 +293,46 @@ fn a_painter_that_was_not_aimed_says_nothing() {
 }
 
 #[test]
-fn a_ramp_of_characters_comes_after_the_words_from_its_middle() {
+fn character_preview_is_drawn_after_text() {
     let picture = Rect::new(0, 0, 20, 5);
     let mut buffer = Buffer::empty(Rect::new(0, 0, 20, 6));
     for y in 0..5 {
         buffer.set_string(0, y, "  ..::--==++**##%%@@", ratatui::style::Style::new());
     }
     buffer.set_string(0, 5, "words", ratatui::style::Style::new());
-    let mut ui = TestTerminal::new(20, 6, ColorDepth::None);
-    ui.painter.aim(&buffer, picture, Fidelity::Moving);
+    let mut test = TestTerminal::new(20, 6, ColorDepth::None);
+    test.painter.aim(&buffer, picture, Fidelity::Moving);
     let mut order = Vec::new();
-    while ui.slice(24) {
-        let rows: Vec<String> = ui.terminal.screen().rows(0, 20).collect();
+    while test.slice(24) {
+        let rows: Vec<String> = test.terminal.screen().rows(0, 20).collect();
         let full = |y: &usize| rows[*y].ends_with('@') || rows[*y] == "words";
         let new: Vec<usize> = (0..6).filter(full).filter(|y| !order.contains(y)).collect();
         order.extend(new);
     }
     assert_eq!(order, [5, 2, 3, 1, 4, 0]);
-    assert_eq!(ui.difference(&buffer, ColorDepth::None), 0);
-    assert!(ui.sent < 160, "{} bytes for 105 characters", ui.sent);
+    assert_eq!(test.difference(&buffer, ColorDepth::None), 0);
+    assert!(test.sent < 160, "{} bytes for 105 characters", test.sent);
 }
 
 #[test]
-fn blanks_of_words_are_erased_in_one_go() {
+fn long_blanks_are_erased() {
     let area = Rect::new(0, 0, 60, 1);
     let mut full = Buffer::empty(area);
     full.set_string(0, 0, "x".repeat(60), ratatui::style::Style::new());
-    let mut ui = TestTerminal::new(60, 1, ColorDepth::TrueColor);
+    let mut test = TestTerminal::new(60, 1, ColorDepth::TrueColor);
     for (text, most) in [("x".repeat(20), 12), (format!("{}{}x", "x".repeat(20), " ".repeat(39)), 16)] {
-        ui.painter.aim(&full, Rect::ZERO, Fidelity::Still);
-        ui.finish(100);
+        test.painter.aim(&full, Rect::ZERO, Fidelity::Still);
+        test.finish(100);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, &text, ratatui::style::Style::new());
-        ui.painter.aim(&buffer, Rect::ZERO, Fidelity::Still);
-        let sent = ui.finish(100);
+        test.painter.aim(&buffer, Rect::ZERO, Fidelity::Still);
+        let sent = test.finish(100);
         assert!(sent <= most, "{sent} bytes for {text:?}");
-        assert_eq!(ui.difference(&buffer, ColorDepth::TrueColor), 0);
+        assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
     }
 }
 
-/// A buffer with a picture in which each cell has its own colors, and words around it.
+/// A buffer with text around a preview in which every cell has its own colors.
 fn with_words() -> Buffer {
     let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
     for place in PICTURE.positions() {
@@ -345,31 +345,31 @@ fn with_words() -> Buffer {
 }
 
 #[test]
-fn words_that_wait_come_after_the_picture() {
+fn delayed_text_follows_the_preview() {
     let buffer = with_words();
     let later = Rect { x: 0, y: 7, width: COLUMNS, height: 1 };
-    for besides in [FrameExtras { later, ..FrameExtras::default() }, FrameExtras::default()] {
-        let mut ui = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
-        ui.painter.aim_with(&buffer, PICTURE, Fidelity::Still, &besides);
+    for extras in [FrameExtras { later, ..FrameExtras::default() }, FrameExtras::default()] {
+        let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
+        test.painter.aim_with(&buffer, PICTURE, Fidelity::Still, &extras);
         let mut cells_before = None;
-        while ui.slice(60) {
-            let text = ui.terminal.screen().contents();
+        while test.slice(60) {
+            let text = test.terminal.screen().contents();
             let is_drawn = |place: &ratatui::layout::Position| {
-                let cell = ui.terminal.screen().cell(place.y, place.x).expect("a cell");
+                let cell = test.terminal.screen().cell(place.y, place.x).expect("a cell");
                 cell.bgcolor() != vt100::Color::Default || cell.fgcolor() != vt100::Color::Default
             };
             if text.contains("later") && cells_before.is_none() {
                 cells_before = Some(PICTURE.positions().filter(is_drawn).count() as u32);
             }
         }
-        assert_eq!(ui.difference(&buffer, ColorDepth::TrueColor), 0);
-        let expected = if besides.later.is_empty() { 0 } else { PICTURE.area() };
-        assert_eq!(cells_before, Some(expected), "{besides:?}");
+        assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
+        let expected = if extras.later.is_empty() { 0 } else { PICTURE.area() };
+        assert_eq!(cells_before, Some(expected), "{extras:?}");
     }
 }
 
 #[test]
-fn a_link_is_on_its_cells_alone_and_is_closed() {
+fn hyperlink_covers_only_its_cells() {
     let buffer = with_words();
     let link = |address: &str| FrameExtras {
         links: vec![Hyperlink {
@@ -379,8 +379,8 @@ fn a_link_is_on_its_cells_alone_and_is_closed() {
         ..FrameExtras::default()
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
-    let mut sent = |besides: &FrameExtras| {
-        painter.aim_with(&buffer, PICTURE, Fidelity::Still, besides);
+    let mut sent = |extras: &FrameExtras| {
+        painter.aim_with(&buffer, PICTURE, Fidelity::Still, extras);
         let mut bytes = Vec::new();
         loop {
             let slice = painter.slice(100);
@@ -391,14 +391,14 @@ fn a_link_is_on_its_cells_alone_and_is_closed() {
         }
     };
     let first = sent(&link("file:///a"));
-    let rest = first.split("now \u{1b}]8;;file:///a\u{1b}\\there").nth(1).expect("a link on its word");
+    let rest = first.split("now \u{1b}]8;;file:///a\u{1b}\\there").nth(1).expect("a hyperlink");
     let (before, _) = rest.split_once("\u{1b}]8;;\u{1b}\\").expect("its end");
     assert!(
         before.chars().all(|c| c.is_ascii_digit() || "\u{1b}[;H".contains(c)),
-        "a move at most: {before:?}"
+        "at most a cursor move: {before:?}"
     );
     assert_eq!(first.matches("file:").count(), 1);
-    assert_eq!(sent(&link("file:///a")), "", "nothing when nothing changes");
+    assert_eq!(sent(&link("file:///a")), "", "no bytes without a change");
     let other = sent(&link("file:///b"));
     assert!(
         other.contains("file:///b\u{1b}\\") && other.contains("there") && !other.contains("now"),

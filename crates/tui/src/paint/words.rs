@@ -1,22 +1,22 @@
-//! Words: exactly as they are wanted.
+//! Planning of text, which is always drawn exactly.
 
 use super::cell::{CellContent, Glyph};
 use super::cursor_moves::{self, CellPosition};
 use super::screen::{ScreenModel, Stroke};
 use super::target_screen::{ScreenRegion, TargetScreen};
 
-/// From so many blanks on, they are erased in one go.
+/// Minimum run of blanks that is erased with one sequence.
 const ERASED: usize = 9;
-/// The same up to the end of a row.
+/// Minimum run of blanks that is erased up to the end of the row.
 const ERASED_TO_END: usize = 4;
 
-/// Plans the strokes of the words of a region in a row, or of a picture made of characters.
+/// Plans the strokes for the text of a region in a row, or for a preview made of characters.
 pub(super) fn plan(screen: &ScreenModel, wanted: &TargetScreen, y: u16, region: ScreenRegion) -> Vec<Stroke> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
         let at = CellPosition { x, y };
         let look = &wanted.row(y)[usize::from(x)];
-        if screen.look(at) == look || wanted.region(x, y) != region {
+        if screen.content(at) == look || wanted.region(x, y) != region {
             continue;
         }
         if let Some(stroke) = stroke(at, look) {
@@ -38,7 +38,7 @@ fn stroke(at: CellPosition, look: &CellContent) -> Option<Stroke> {
     }
 }
 
-/// Writes the cells between the last stroke and a place again, if that is shorter than a jump over them.
+/// Redraws the cells between the last stroke and `to` if that is shorter than moving the cursor over them.
 fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     let Some(Stroke::Text { at, text }) = strokes.last() else { return };
     let first = at.x + text.columns;
@@ -46,7 +46,7 @@ fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     let (mut between, mut bytes) = (Vec::new(), 0);
     for x in first..to.x {
         let at = CellPosition { x, ..to };
-        match screen.look(at) {
+        match screen.content(at) {
             CellContent::Text(other) if other.pen == text.pen && other.is_plain() => {
                 bytes += other.symbol.len();
                 between.push(Stroke::Text { at, text: other.clone() });
@@ -68,7 +68,7 @@ fn bridge(screen: &ScreenModel, strokes: &mut Vec<Stroke>, to: CellPosition) {
     strokes.extend(between);
 }
 
-/// The same with many blanks in a row erased in one go.
+/// Replaces long runs of blanks with erase sequences.
 fn erased(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
     let mut shorter = Vec::with_capacity(strokes.len());
     for run in strokes.chunk_by(|a, b| is_blank(a) && is_blank(b) && a.at().x + 1 == b.at().x) {

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::Setup;
-use crate::color::{Ansi, ColorDepth, Shades};
+use crate::color::{AnsiColors, ColorDepth, ColorMapper};
 use crate::event::{FrameReport, Window};
 use crate::graphics::Protocol;
 use crate::mosaic::Grid;
@@ -17,13 +17,13 @@ pub(crate) struct DisplayState {
     pub window: Window,
     pub kind: PreviewKind,
     pub depth: ColorDepth,
-    pub shades: Shades,
+    pub shades: ColorMapper,
     /// The terminal's 16 colors.
-    pub ansi: Ansi,
+    pub ansi: AnsiColors,
     /// Questions to the terminal.
     pub ask: TerminalQueries,
     /// Abilities of the terminal besides text.
-    pub abilities: Capabilities,
+    pub capabilities: Capabilities,
     /// Time after which the end of a render is worth a notification. `None` for none.
     pub notify_after: Option<Duration>,
     /// Whether its window has the focus, as far as it says.
@@ -47,10 +47,10 @@ impl DisplayState {
             window: setup.window,
             kind: setup.preview,
             depth: setup.depth,
-            shades: Shades::new(setup.depth, &setup.ansi),
+            shades: ColorMapper::new(setup.depth, &setup.ansi),
             ansi: setup.ansi,
             ask: setup.ask,
-            abilities: setup.abilities,
+            capabilities: setup.capabilities,
             notify_after: setup.notify_after,
             has_focus: true,
             is_light: setup.is_light,

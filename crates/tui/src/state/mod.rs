@@ -18,7 +18,7 @@ pub(super) use self::request::{CameraStep, ImageOrigin, RequestState, Toggles, s
 pub(super) use self::saving::{OwnImage, PendingChange, SavingState, WrittenFile};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};
-use super::color::{Ansi, ColorDepth};
+use super::color::{AnsiColors, ColorDepth};
 use super::event::Window;
 use super::preview_kind::PreviewKind;
 use super::terminal_replies::TerminalQueries;
@@ -36,11 +36,11 @@ pub(super) struct Setup {
     /// Whether the environment says that the terminal's background is light.
     pub is_light: bool,
     /// Likely values of the 16 colors.
-    pub ansi: Ansi,
+    pub ansi: AnsiColors,
     /// Questions to the terminal.
     pub ask: TerminalQueries,
     /// Abilities of the terminal besides text, by the environment.
-    pub abilities: Capabilities,
+    pub capabilities: Capabilities,
     /// Time after which the end of a render is worth a notification. `None` for none.
     pub notify_after: Option<Duration>,
 }

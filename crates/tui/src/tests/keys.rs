@@ -142,7 +142,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 "{}",
                 ui.text()
             );
-            ui.state.display.abilities.clipboard = true;
+            ui.state.display.capabilities.clipboard = true;
             assert!(matches!(ui.key(key)[..], [Effect::Aside(_)]));
         }
         Action::Focus => {

@@ -215,7 +215,7 @@ fn y_copies_what_was_clicked_where_the_terminal_takes_it() {
         "{text}"
     );
     assert!(text.contains("normal (0, 1, 0) · pixel 1, 2"), "{text}");
-    ui.state.display.abilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.abilities();
+    ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
     let effects = ui.press('y');
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · 3.9 away · at (0.2, 0.5, -0.3) · \
                  radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";

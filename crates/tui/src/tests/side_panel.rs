@@ -443,7 +443,7 @@ fn what_is_written_is_a_link() {
 /// Ends a render after so many seconds. Returns what is sent beside the picture.
 fn told(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
-    ui.state.display.abilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.abilities();
+    ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
     prepare(&mut ui);
     ui.wait(1000 * seconds);
     let effects = ui.worker(done(1, Vec::new(), false));

@@ -196,7 +196,7 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
     let Some(clicked) = state.selection.clicked.clone() else {
         return notify(state, "nothing was clicked yet: click, or press Enter, then y copies what is there");
     };
-    if !state.display.abilities.clipboard {
+    if !state.display.capabilities.clipboard {
         // It stands there to be selected.
         return notify(state, &format!("to copy, drag with shift (or after m): {clicked}"));
     }

@@ -2,7 +2,7 @@
 
 use super::request::resized_preview;
 use super::say::say_until_key;
-use crate::color::{ColorDepth, Shades};
+use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
 use crate::graphics::Protocol;
 use crate::pixel_request::PixelRequest;
@@ -100,7 +100,7 @@ pub(super) fn lack_pixels(state: &mut State) {
 
 fn show(state: &mut State, depth: ColorDepth) {
     state.display.depth = depth;
-    state.display.shades = Shades::new(depth, &state.display.ansi);
+    state.display.shades = ColorMapper::new(depth, &state.display.ansi);
     state.dirty = true;
 }
 
@@ -109,8 +109,8 @@ fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
     let ask = state.display.ask;
     let mut effects = Vec::new();
     if ask.name {
-        let had_focus = std::mem::replace(&mut state.display.abilities, terminal.abilities()).focus;
-        effects.extend((state.display.abilities.focus && !had_focus).then_some(Effect::ReportFocus));
+        let had_focus = std::mem::replace(&mut state.display.capabilities, terminal.capabilities()).focus;
+        effects.extend((state.display.capabilities.focus && !had_focus).then_some(Effect::ReportFocus));
         state.dirty = true;
     }
     if ask.blocks {
@@ -147,9 +147,9 @@ mod tests {
     use crate::update::start;
 
     /// A desk of a user who wants kitty's images.
-    fn wanting_pixels(passage: ImageRoute) -> TestUi {
+    fn wanting_pixels(route: ImageRoute) -> TestUi {
         let mut state = state(80, 24);
-        let request = PixelRequest { protocol: Protocol::Kitty, passage, is_known: false };
+        let request = PixelRequest { protocol: Protocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
         state.display.pixels_until = Some(request.deadline(state.now));
         TestUi::with(state)
@@ -200,7 +200,7 @@ mod tests {
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] });
         assert!(learn(&mut state, foot).is_empty(), "nobody asked");
-        assert_eq!(state.display.abilities, Capabilities::default());
+        assert_eq!(state.display.capabilities, Capabilities::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
         let effects = learn(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
@@ -214,7 +214,7 @@ mod tests {
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: Brand::Ghostty, version: [1, 2] };
         assert!(matches!(learn(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
-        assert_eq!(state.display.abilities, ghostty.abilities());
+        assert_eq!(state.display.capabilities, ghostty.capabilities());
         assert!(learn(&mut state, TerminalReply::Name(ghostty)).is_empty(), "it reports the focus already");
     }
 

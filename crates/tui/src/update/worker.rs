@@ -158,7 +158,7 @@ fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
     let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
-    let notice = time.zip(state.display.abilities.notice);
+    let notice = time.zip(state.display.capabilities.notice);
     notice.map(|(time, way)| Effect::Aside(window_title::notice(state, way, time))).into_iter().collect()
 }
 

@@ -9,7 +9,7 @@ use super::marks;
 use super::message;
 use super::ramp::Ramp;
 use super::text::{Tone, put};
-use crate::color::{ColorDepth, Shades, XTERM};
+use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Picture;
 use crate::graphics::PixelPlacement;
 use crate::history::ShownImage;
@@ -94,7 +94,7 @@ pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
 #[derive(Clone, Copy)]
 pub(crate) struct PreviewColors<'a> {
     pub(crate) depth: ColorDepth,
-    pub(crate) shades: &'a Shades,
+    pub(crate) shades: &'a ColorMapper,
     /// Whether the terminal's background is.
     pub(crate) is_light: bool,
 }
@@ -107,7 +107,7 @@ impl<'a> PreviewColors<'a> {
 
 /// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colors of xterm.
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
-    let shades = Shades::new(depth, &XTERM);
+    let shades = ColorMapper::new(depth, &XTERM);
     let inks = PreviewColors { depth, shades: &shades, is_light: false };
     shown_by(picture, choice, inks, (area, 2.0))
 }
@@ -215,7 +215,13 @@ impl ScaledImage<'_> {
 }
 
 /// A cell in two colors.
-fn mosaic(scaled: &ScaledImage<'_>, grid: Grid, shades: &Shades, (x, y): (usize, usize), cell: &mut Cell) {
+fn mosaic(
+    scaled: &ScaledImage<'_>,
+    grid: Grid,
+    shades: &ColorMapper,
+    (x, y): (usize, usize),
+    cell: &mut Cell,
+) {
     let (left, top) = (x as u32 * grid.columns(), y as u32 * grid.rows());
     let part = |i: u32| scaled.pixel(left + i % grid.columns(), top + i / grid.columns());
     let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();

@@ -1,9 +1,9 @@
-//! Abilities of a terminal, by its name.
+//! Capabilities derived from the terminal's name.
 
 use crate::terminals::Brand;
 
-/// Whether the terminal knows REP (ECMA-48 8.3.103: the character before so many times more), by the names that it
-/// leaves in the environment. Many call themselves `xterm-256color`, and not all of those do.
+/// Whether the terminal supports REP (ECMA-48 8.3.103, repeat the preceding character), judged by its
+/// environment variables. Many terminals call themselves `xterm-256color`, and not all of those support it.
 pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
     const TERMS: [&str; 8] =
         ["xterm-kitty", "alacritty", "foot", "xterm-ghostty", "wezterm", "contour", "tmux", "rio"];
@@ -18,7 +18,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_terminals_that_are_known_to_repeat() {
+    fn rep_is_used_only_where_known() {
         let known = |variables: &[(&str, &str)]| {
             can_repeat(|name| {
                 variables.iter().find(|(n, _)| *n == name).map(|(_, value)| (*value).to_owned())

@@ -1,9 +1,9 @@
-//! Colors that a terminal does not have, mixed by the eye from those that it has.
+//! Dithering recipes: colors outside of a palette, mixed from the inks in it.
 //!
-//! For each color a recipe of [`PARTS`] inks is found whose mean in linear light is the color, and whose inks are as
-//! near to it, and so to each other, as that allows: the remaining error is fed back from one ink to the next (after
-//! J. Yliluoma and T. Knoll, "pattern dithering"), in Oklab linearised at the color. The parts are sorted by lightness,
-//! and a threshold picks one of them: the same at the same place, whatever its neighbors are.
+//! A recipe has [`PARTS`] inks whose mean in linear light is the color, each as close to the color as
+//! possible. The remaining error is fed back from one ink to the next in Oklab, linearized at the color
+//! (after J. Yliluoma and T. Knoll, "pattern dithering"). The parts are sorted by lightness and a threshold
+//! picks one of them, so the result depends only on the color and the pixel position.
 
 use std::collections::HashMap;
 
@@ -11,32 +11,32 @@ use super::oklab::{OklabDerivative, oklab};
 use crate::math::Vec3;
 use crate::math::color::srgb8_to_linear;
 
-/// Inks in a recipe.
+/// Inks per recipe.
 pub(super) const PARTS: usize = 16;
-/// Inks that are looked at for a recipe: those nearest to the color.
+/// Candidate inks per recipe: those nearest to the color.
 const NEAREST: usize = 32;
-/// Most recipes that are kept.
+/// Maximum number of cached recipes.
 const MOST_RECIPES: usize = 1 << 16;
 
-/// An ink: a color or a pattern to mix from.
+/// A color or pattern to mix from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ink {
     linear: Vec3,
     lab: Vec3,
-    /// Its distance from a single color, squared.
+    /// Squared distance from a single color, for patterns.
     texture: f32,
 }
 
 impl Ink {
-    /// One color.
+    /// A solid color.
     pub(super) fn plain(rgb: [u8; 3]) -> Self {
         let linear = srgb8_to_linear(rgb);
         Self { linear, lab: oklab(linear), texture: 0.0 }
     }
 
-    /// A share of one ink in another, in a fine pattern.
+    /// A fine pattern with a fraction `share` of `front` on `back`.
     pub(super) fn shaded(front: &Self, back: &Self, share: f32) -> Self {
-        /// A pattern within a cell is seen less than one of cells.
+        /// A pattern within a cell is less visible than one made of cells.
         const FINENESS: f32 = 0.25;
         let linear = front.linear * share + back.linear * (1.0 - share);
         let lab = oklab(linear);
@@ -46,22 +46,23 @@ impl Ink {
     }
 }
 
-/// The recipes from some inks.
+/// Cached dithering recipes for a set of inks.
 #[derive(Debug, Default)]
 pub(super) struct Mixer {
     inks: Vec<Ink>,
-    /// Weight of the distance between inks, beside the distance of their mean.
+    /// Weight of the distance between the inks, relative to the error of their mean.
     calm: f32,
     recipes: HashMap<[u8; 3], [u16; PARTS]>,
 }
 
 impl Mixer {
-    /// From these. `calm`: from 0, where only the mean counts, up; then the nearest ink counts more and more.
+    /// A mixer of these inks. For `calm` = 0 only the mean counts; the larger it is, the more the nearest ink
+    /// is preferred.
     pub(super) fn new(inks: Vec<Ink>, calm: f32) -> Self {
         Self { inks, calm, recipes: HashMap::new() }
     }
 
-    /// The index of the ink for a color where the threshold, in (0, 1), is this.
+    /// Index of the ink for a color where the dither threshold in (0, 1) is `threshold`.
     pub(super) fn ink(&mut self, rgb: [u8; 3], threshold: f32) -> usize {
         let part = ((threshold * PARTS as f32) as usize).min(PARTS - 1);
         let recipe = match self.recipes.get(&rgb) {
@@ -95,7 +96,7 @@ impl Mixer {
             near.select_nth_unstable_by(most, |a, b| a.0.total_cmp(&b.0));
         }
         near.truncate(most);
-        // Of equally good inks the first.
+        // Break ties by index.
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let off: Vec<Vec3> =
             near.iter().map(|(_, index)| slope.change(self.inks[*index].linear - linear)).collect();
@@ -123,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn an_ink_stays_as_it_is() {
+    fn ink_colors_are_not_dithered() {
         let mut mixer = cube();
         for index in [0, 5, 100, 215, 230] {
             let rgb = palette::fixed(16 + index).expect("a fixed color");
@@ -135,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_a_recipe_is_the_color() {
+    fn recipe_mean_matches_the_color() {
         let mut mixer = cube();
         for rgb in [[150, 75, 50], [101, 67, 33], [30, 60, 90], [200, 190, 180], [115, 115, 110]] {
             let parts: Vec<usize> =
@@ -147,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn inks_of_a_recipe_are_near_to_each_other() {
+    fn recipe_inks_are_similar() {
         let mut mixer = cube();
         let lab = oklab(srgb8_to_linear([150, 75, 50]));
         for part in 0..PARTS {

@@ -1,27 +1,28 @@
-//! The colors of a cell of two, as the terminal has them.
+//! Maps sRGB colors to the colors that the terminal supports, with dithering.
 
 use std::cell::RefCell;
 
-use super::mix::{Ink, Mixer};
+use super::bayer::threshold;
 use super::oklab::oklab;
-use super::palette::{self, Ansi};
-use super::pattern::threshold;
+use super::palette::{self, AnsiColors};
+use super::recipes::{Ink, Mixer};
 use super::{ColorDepth, NAMES};
 use crate::math::color::srgb8_to_linear;
 use crate::mosaic::{FittedCell, Tile};
 use ratatui::style::Color;
 
-/// Weight of calm in the palette of 256, whose colors are near to each other, and in that of 16.
+/// Preference for near colors among the 256, and among the 16.
 const CALM_256: f32 = 3.0;
 const CALM_16: f32 = 3.0;
-/// The same where the two colors of a cell are halves, which show the edges of things.
+/// The same for halves with edges in them.
 const CALM_EDGES: f32 = 200.0;
-/// Halves that differ by more than this in Oklab, squared, are drawn as halves; else their mean is mixed from shades.
+/// Halves that differ by more than this in Oklab (squared) are drawn as halves. Otherwise their mean is mixed
+/// from shade characters.
 const EDGE: f32 = 0.01;
-/// The parts of a shade's foreground in its cell.
+/// Fractions of a cell that the shade characters fill with the foreground.
 const LEVELS: [f32; 3] = [0.25, 0.5, 0.75];
 
-/// A cell as it is drawn: its first part in the first color.
+/// A cell to draw: a tile and the colors of its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct DrawnCell {
     pub(crate) tile: Tile,
@@ -31,24 +32,24 @@ pub(crate) struct DrawnCell {
 /// Two of the 16 colors in one cell.
 #[derive(Clone, Copy, Debug)]
 struct ColorPair {
-    /// None: the first color alone.
+    /// Index of the shade character. `None` for the first color only.
     level: Option<usize>,
     colors: [usize; 2],
 }
 
-/// Colors as a terminal shows them.
+/// Maps colors to those of a terminal.
 #[derive(Debug)]
-pub(crate) struct Shades {
+pub(crate) struct ColorMapper {
     depth: ColorDepth,
     plain: RefCell<Mixer>,
-    /// Mixer of cells of two colors, for terminals of 16.
+    /// Mixer for cells with shade characters, on 16-color terminals.
     mixed: RefCell<Mixer>,
     pairs: Vec<ColorPair>,
 }
 
-impl Shades {
-    /// For a terminal of that many colors; of 16, these.
-    pub(crate) fn new(depth: ColorDepth, ansi: &Ansi) -> Self {
+impl ColorMapper {
+    /// A mapper for a terminal of this color depth, with `ansi` as its 16 colors.
+    pub(crate) fn new(depth: ColorDepth, ansi: &AnsiColors) -> Self {
         let none = || RefCell::new(Mixer::default());
         let mut shades = Self { depth, plain: none(), mixed: none(), pairs: Vec::new() };
         match depth {
@@ -71,7 +72,7 @@ impl Shades {
         shades
     }
 
-    /// A color alone at a place.
+    /// The terminal color for a color at a pixel position.
     pub(crate) fn color(&self, rgb: [u8; 3], x: usize, y: usize) -> Color {
         let index = || self.plain.borrow_mut().ink(rgb, threshold(x, y));
         match self.depth {
@@ -82,7 +83,7 @@ impl Shades {
         }
     }
 
-    /// A cell at this column and row of the picture.
+    /// The cell to draw at this column and row of the preview.
     pub(crate) fn cell(&self, fitted: FittedCell, x: usize, y: usize) -> DrawnCell {
         let [first, second] = fitted.pair;
         if self.depth == ColorDepth::Ansi16 {
@@ -109,7 +110,7 @@ impl Shades {
     }
 }
 
-/// Each color alone, and each pair at each level.
+/// Each single color, and each pair at each level.
 fn pairs(inks: &[Ink]) -> Vec<ColorPair> {
     let alone = (0..inks.len()).map(|color| ColorPair { level: None, colors: [color; 2] });
     let both = (0..inks.len()).flat_map(|a| (0..a).map(move |b| [a, b]));
@@ -129,16 +130,16 @@ mod tests {
     use super::*;
     use crate::color::XTERM;
 
-    fn cell(shades: &Shades, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
+    fn cell(shades: &ColorMapper, rgb: [u8; 3], x: usize, y: usize) -> DrawnCell {
         shades.cell(FittedCell { tile: Tile::HALVES, pair: [rgb; 2] }, x, y)
     }
 
     #[test]
-    fn a_cell_hangs_on_its_colors_and_place_alone() {
+    fn cell_depends_only_on_color_and_position() {
         for depth in [ColorDepth::Indexed256, ColorDepth::Ansi16] {
-            let (one, other) = (Shades::new(depth, &XTERM), Shades::new(depth, &XTERM));
+            let (one, other) = (ColorMapper::new(depth, &XTERM), ColorMapper::new(depth, &XTERM));
             for i in 0..200 {
-                // Other colors, in another order.
+                // Different colors in a different order.
                 cell(&other, [i as u8, 90, 200 - i as u8], i, 3);
             }
             for (x, y) in [(0, 0), (3, 1), (7, 5)] {
@@ -148,8 +149,8 @@ mod tests {
     }
 
     #[test]
-    fn exact_colors_of_16_stay_at_every_place() {
-        let shades = Shades::new(ColorDepth::Ansi16, &XTERM);
+    fn exact_ansi_colors_are_not_dithered() {
+        let shades = ColorMapper::new(ColorDepth::Ansi16, &XTERM);
         for (rgb, name) in XTERM.into_iter().zip(NAMES) {
             for place in 0..64 {
                 assert_eq!(cell(&shades, rgb, place % 8, place / 8).pair, [name; 2], "{rgb:?}");
@@ -158,8 +159,8 @@ mod tests {
     }
 
     #[test]
-    fn a_gray_between_two_of_16_is_mixed_of_grays_in_its_cells() {
-        let shades = Shades::new(ColorDepth::Ansi16, &XTERM);
+    fn gray_between_ansi_colors_is_mixed_from_grays() {
+        let shades = ColorMapper::new(ColorDepth::Ansi16, &XTERM);
         for place in 0..64 {
             let DrawnCell { pair, .. } = cell(&shades, [70; 3], place % 8, place / 8);
             assert!(pair.iter().all(|color| [Color::Black, Color::DarkGray].contains(color)), "{pair:?}");
@@ -167,10 +168,10 @@ mod tests {
     }
 
     #[test]
-    fn edges_are_drawn_as_halves_and_other_colors_of_the_terminal_are_heeded() {
+    fn edges_use_halves_and_reported_ansi_colors() {
         let mut ansi = XTERM;
         ansi[1] = [150, 75, 50];
-        let shades = Shades::new(ColorDepth::Ansi16, &ansi);
+        let shades = ColorMapper::new(ColorDepth::Ansi16, &ansi);
         assert_eq!(cell(&shades, [150, 75, 50], 2, 2).pair, [Color::Red; 2]);
         let edge = FittedCell { tile: Tile::HALVES, pair: [[255; 3], [0; 3]] };
         assert_eq!(

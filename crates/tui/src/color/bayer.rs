@@ -1,10 +1,10 @@
-//! The order in which the places of a picture turn from one color to the next.
+//! Ordered dithering.
 
-/// Columns and rows after which the pattern repeats.
+/// Period of the pattern in columns and rows.
 const SIDE: usize = 8;
 
-/// The threshold of a place, in (0, 1): Bayer's matrix ("An optimum method for two-level rendition of
-/// continuous-tone pictures", 1973). It hangs on the place alone, so that what does not change does not flicker.
+/// Dither threshold of a pixel, in (0, 1), from Bayer's matrix ("An optimum method for two-level rendition of
+/// continuous-tone pictures", 1973). It depends only on the position, so static content does not flicker.
 pub(super) fn threshold(x: usize, y: usize) -> f32 {
     let (x, y) = (x % SIDE, y % SIDE);
     let mixed = x ^ y;
@@ -15,8 +15,8 @@ pub(super) fn threshold(x: usize, y: usize) -> f32 {
     (rank as f32 + 0.5) / (SIDE * SIDE) as f32
 }
 
-/// A color in six bits of a channel, dithered.
-pub(crate) fn finer(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
+/// Dithers a color to six bits per channel.
+pub(crate) fn dithered_to_6_bits(rgb: [u8; 3], x: usize, y: usize) -> [u8; 3] {
     const LEVELS: u16 = 63;
     let more = (threshold(x, y) * 255.0) as u16;
     rgb.map(|channel| {
@@ -30,7 +30,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_rank_is_there_once_and_every_quarter_has_its_share() {
+    fn bayer_ranks_are_a_permutation() {
         let mut ranks: Vec<u32> = (0..64).map(|i| (threshold(i % 8, i / 8) * 64.0) as u32).collect();
         for corner in [(0, 0), (4, 0), (0, 4), (4, 4)] {
             let below = (0..16).filter(|i| threshold(corner.0 + i % 4, corner.1 + i / 4) < 0.25).count();
@@ -42,9 +42,12 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_finer_colors_is_the_color() {
-        assert_eq!((finer([0; 3], 3, 4), finer([255; 3], 3, 4)), ([0; 3], [255; 3]));
-        let sum: u32 = (0..64).map(|i| u32::from(finer([101; 3], i % 8, i / 8)[0])).sum();
+    fn dithered_mean_is_the_color() {
+        assert_eq!(
+            (dithered_to_6_bits([0; 3], 3, 4), dithered_to_6_bits([255; 3], 3, 4)),
+            ([0; 3], [255; 3])
+        );
+        let sum: u32 = (0..64).map(|i| u32::from(dithered_to_6_bits([101; 3], i % 8, i / 8)[0])).sum();
         assert!(sum.abs_diff(101 * 64) <= 64, "{sum}");
     }
 }
