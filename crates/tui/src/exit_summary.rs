@@ -1,4 +1,4 @@
-//! The line that stays when the screen is given back.
+//! The summary printed after the terminal is restored.
 
 use super::event::WriteFailure;
 use super::state::{Activity, OwnImage, State, Toggles, WrittenFile};
@@ -8,7 +8,7 @@ use crate::pipeline::settings::{CameraChange, View};
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// The files written, with their samples and seconds, and what happened after that.
+/// The written files with samples and times, and what happened afterwards.
 pub(super) fn words(state: &State) -> String {
     match &state.saving.write_failed {
         Some(failed) => unwritten(state, failed),
@@ -17,7 +17,7 @@ pub(super) fn words(state: &State) -> String {
     }
 }
 
-/// Changes by keys that are neither in the scene nor in an image, as options of the next call.
+/// Changes made with keys that are neither in the scene nor in an image, as command-line options.
 pub(super) fn not_kept(state: &State) -> Option<String> {
     let shown = state.request.toggles;
     let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
@@ -51,7 +51,7 @@ fn unfinished(state: &State) -> String {
     }
 }
 
-/// Events after the files were written.
+/// What happened after the files were written.
 fn since(state: &State) -> String {
     if is_broken(state) {
         return format!("; {} has errors since", scene_name(state));
@@ -91,7 +91,7 @@ fn scene_name(state: &State) -> String {
     visible(&name).into_owned()
 }
 
-/// The files written and their descriptions, grouped by image.
+/// The written files and their descriptions, grouped by image.
 fn files(written: &[WrittenFile]) -> String {
     let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
@@ -109,7 +109,7 @@ fn files(written: &[WrittenFile]) -> String {
     said.join("; ")
 }
 
-/// The picture that is not on disk, and why; and the other files written, of the same picture and of earlier ones.
+/// The image that is not on disk and why, then the other files of this and earlier images.
 fn unwritten(state: &State, failed: &WriteFailure) -> String {
     let mut words = format!("not written: {}", visible(&failed.why));
     for written in &state.saving.written {
@@ -118,14 +118,15 @@ fn unwritten(state: &State, failed: &WriteFailure) -> String {
         words += match (is_new, written.is_stale) {
             (true, false) => "; wrote ",
             (true, true) => "; before that, wrote ",
-            (false, _) => "; wrote an earlier one to ",
+            (false, _) => "; wrote an earlier image to ",
         };
         words += &name;
     }
     words
 }
 
-/// A picture and its cost, in words. A picture whose samples were there already had its cost before.
+/// Describes an image and its render time. If its samples were reused, this is the time when they were
+/// rendered.
 pub(super) fn made(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
@@ -152,17 +153,17 @@ mod tests {
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::diagnostic::Severity;
 
-    /// The report of a request, changed.
+    /// A modified report of a finished request.
     fn done_as(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
         let Event::Done { mut report, warnings, unchanged, .. } = done(generation, Vec::new(), false) else {
-            panic!("it is done")
+            panic!("a finished request")
         };
         change(&mut report);
         Event::Done { generation, report, warnings, unchanged }
     }
 
     #[test]
-    fn a_picture_that_is_written_while_a_newer_one_is_asked_for_is_named() {
+    fn write_during_a_newer_request_is_listed() {
         let mut ui = TestUi::new();
         ui.finish([200, 30, 30]);
         ui.press('r');
@@ -176,11 +177,11 @@ mod tests {
         ui.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(words(&ui.state), format!("{made}; the render after it is not finished (50 %)"));
-        assert!(ui.text().contains("not saved · w saves it"), "of the one at hand: {}", ui.text());
+        assert!(ui.text().contains("not saved · w saves it"), "the newest image: {}", ui.text());
     }
 
     #[test]
-    fn the_seconds_are_those_of_the_picture_in_the_file() {
+    fn time_is_that_of_the_written_image() {
         let mut ui = TestUi::new();
         let write = |ui: &mut TestUi, seconds: f64, rendered: f64| {
             let generation = ui.state.request.generation;
@@ -199,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_that_was_written_is_said_to_be_one() {
+    fn written_view_is_named() {
         let mut ui = TestUi::new();
         ui.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
         ui.finish([200, 30, 30]);
@@ -212,14 +213,14 @@ mod tests {
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
-        assert_eq!(words(&ui.state), own, "that is what is written");
+        assert_eq!(words(&ui.state), own, "the file is unchanged");
         ui.press('w');
         ui.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
         assert_eq!(words(&ui.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
 
     #[test]
-    fn a_save_that_is_only_shown_is_not_said_to_be_in_the_file() {
+    fn shown_save_is_not_claimed_to_be_written() {
         let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
         for key in ['v', 'l'] {
             let mut ui = TestUi::new();
@@ -234,7 +235,7 @@ mod tests {
             let after = words(&ui.state);
             assert_eq!(after, format!("{made} (older than your last edit)"), "{key}");
             assert_eq!(not_kept(&ui.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
-            // A save that changes nothing does not make it newer.
+            // A save without effect does not make it newer.
             ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
             let generation = ui.state.request.generation;
             ui.worker(Event::Started { generation });
@@ -244,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn what_could_not_be_written_is_told_whatever_is_shown_since() {
+    fn write_failure_is_reported_until_fixed() {
         let mut ui = TestUi::new();
         let fail = |ui: &mut TestUi| {
             let generation = ui.state.request.generation;
@@ -266,7 +267,7 @@ mod tests {
             ui.worker(finished(generation, Status::Skipped));
             assert!(words(&ui.state).starts_with(failed), "{key}");
         }
-        // Back at the scene's own, where the disk has room or the picture of before.
+        // Back at the scene's own image, once the disk has space or the image exists.
         ui.press('0');
         for status in [Status::Done, Status::Reused] {
             fail(&mut ui);
@@ -279,7 +280,7 @@ mod tests {
         }
     }
 
-    /// A request that ends, with its last stage like this.
+    /// A finished request whose write stage has this status.
     fn finished(generation: u64, write: Status) -> Event {
         let mut event = done(generation, Vec::new(), false);
         if let Event::Done { report, .. } = &mut event {
@@ -289,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn it_tells_what_was_written_and_what_was_not() {
+    fn summary_lists_written_and_missing_images() {
         let mut ui = TestUi::new();
         assert_eq!(words(&ui.state), "no image written");
         let settings = Box::new(crate::fixtures::settings());
@@ -318,7 +319,7 @@ mod tests {
         ui.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
         ui.worker(done(3, Vec::new(), false));
         let failed =
-            "not written: cannot write b.exr: no space; wrote an earlier one to cornell.png; wrote a.png";
+            "not written: cannot write b.exr: no space; wrote an earlier image to cornell.png; wrote a.png";
         assert_eq!(words(&ui.state), failed);
         ui.press('r');
         ui.worker(Event::Started { generation: 4 });
@@ -331,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_by_keys_are_listed_as_options_until_they_are_kept_or_written() {
+    fn unsaved_changes_are_listed_as_options() {
         let mut ui = TestUi::new();
         ui.finish([200, 30, 30]);
         assert_eq!(not_kept(&ui.state), None);
@@ -349,14 +350,14 @@ mod tests {
         ui.key(crate::event::KeyPress::special(crossterm::event::KeyCode::Esc));
         ui.press('l');
         ui.finish([200, 30, 30]);
-        let words = not_kept(&ui.state).expect("moved since");
+        let words = not_kept(&ui.state).expect("the camera moved");
         assert!(words.contains("--set 'camera.position=["), "{words}");
         ui.press('0');
         assert_eq!(not_kept(&ui.state), None);
     }
 
     #[test]
-    fn passing_by_the_own_image_leaves_its_file_finished() {
+    fn passing_the_own_image_keeps_it_finished() {
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         let mut ui = TestUi::new();
         ui.worker(Event::Started { generation: 1 });
@@ -364,13 +365,13 @@ mod tests {
         ui.finish([200, 30, 30]);
         ui.press('s');
         ui.finish([30, 200, 30]);
-        // The next key comes before the request of the own image ends.
+        // The next key is pressed before the request ends.
         ui.press('0');
         ui.worker(Event::Started { generation: ui.state.request.generation });
         assert_eq!(words(&ui.state), made);
         ui.press(']');
         assert_eq!(words(&ui.state), made);
-        // Samples of another own image.
+        // Samples of a new version of the image.
         ui.press('0');
         let generation = ui.state.request.generation;
         ui.worker(Event::Started { generation });
@@ -381,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn the_own_image_is_told_while_keys_show_something_else() {
+    fn own_image_is_tracked_while_keys_change_it() {
         let mut ui = TestUi::new();
         let own = |ui: &mut TestUi, state| {
             let generation = ui.state.request.generation;
@@ -399,7 +400,7 @@ mod tests {
         let said = crate::view::status_line::not_saved(&ui.state);
         assert_eq!(said, ["not saved · w saves it", "cornell.png at 10 %: 0 continues it"]);
         assert!(ui.text().contains("not saved · w saves it"), "{}", ui.text());
-        // `w` writes what is shown.
+        // `w` writes the image that is shown.
         ui.press('w');
         let generation = ui.state.request.generation;
         ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });

@@ -1,4 +1,4 @@
-//! The last pictures, within bounds.
+//! History of recent renders, bounded in memory.
 
 use std::cell::OnceCell;
 use std::collections::{HashMap, VecDeque};
@@ -6,58 +6,54 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::film::Picture;
+use crate::messages;
 use crate::pipeline::protocol::{PreviewSource, Section};
 use crate::rescale::resized;
 use crate::state::ImageOrigin;
 
-/// Bytes that all of them take, at most.
+/// Maximum memory of all images and scene texts.
 const MOST_BYTES: usize = 16 << 20;
-/// Columns and rows of a small picture, at most: as fine as octants draw it.
+/// Maximum width and height of a thumbnail, as fine as octants can show.
 const SMALL: f32 = 32.0;
 
-/// Change of a picture that differs from the one before in nothing but its noise.
-const AGAIN: &str = "rendered again";
-/// Mark of a picture whose render was stopped.
-const UNFINISHED: &str = "unfinished";
-
-/// A picture and the request that it shows.
+/// An image and the request that it shows.
 #[derive(Clone, Debug)]
 pub(crate) struct ShownImage {
     pub generation: u64,
     pub picture: Arc<Picture>,
-    /// Least and greatest number of the view, if the picture is stretched to them.
+    /// Range of values of the view, if the image was mapped to a range.
     pub range: Option<[f32; 2]>,
-    /// The part of the image that is shown pixel by pixel. `None` if all of the image is shown.
+    /// The section of the image that is shown pixel by pixel. `None` if the whole image is shown.
     pub section: Option<Section>,
-    /// Whether it lacks the light of photons, which are still being traced.
+    /// Whether it lacks light from photons that are still being traced.
     pub lacks_photons: bool,
-    /// The image that it shows. `None` if that is not known.
+    /// The image that the preview belongs to. `None` if unknown.
     pub source: Option<PreviewSource>,
 }
 
 impl ShownImage {
-    /// Whether both show the same image, whatever their samples and their size.
+    /// Whether both show the same image, regardless of their samples and size.
     pub(crate) fn is_of_same_image(&self, other: &Self) -> bool {
         let images = self.source.zip(other.source);
         images.is_some_and(|(own, other)| own.image == other.image)
     }
 
-    /// Whether it has all samples of its image, as far as that is known.
+    /// Whether it is known to have all samples of its image.
     pub(crate) fn is_finished(&self) -> bool {
         self.source.is_some_and(|source| source.is_finished)
     }
 }
 
-/// The last pictures, and which of them is looked at.
+/// The recent renders, and the one being looked at.
 #[derive(Debug, Default)]
 pub(super) struct History {
-    /// The oldest first.
+    /// Oldest first.
     past: VecDeque<HistoryEntry>,
-    /// Edits of the scene so far.
+    /// Number of edits of the scene.
     edits: u64,
-    /// The last edit whose scene could be read and may have changed the picture.
+    /// The last edit whose scene was valid and may have changed the image.
     read_edits: u64,
-    /// Index of the picture that is looked at, and the newest picture meanwhile.
+    /// Index of the older render being looked at, and the newest image.
     open: Option<(usize, ShownImage)>,
 }
 
@@ -66,53 +62,54 @@ struct HistoryEntry {
     shown: ShownImage,
     /// Time at which its render last improved it.
     time: Instant,
-    /// The last edit that it is after.
+    /// The last edit that it includes.
     edits: u64,
     origin: ImageOrigin,
-    /// Number of the run that finished it. `None` if none has.
+    /// Number of the completed render that finished it. `None` if none did.
     run: Option<u64>,
-    /// Changes since the picture before: of files, then by keys. `None` for the first picture.
+    /// Changes since the previous entry: in files, then with keys. `None` for the first entry.
     changes: Option<[Vec<String>; 2]>,
-    /// The small picture of the strip, made at its first use.
+    /// Thumbnail for the history strip, made at first use.
     small: OnceCell<Picture>,
 }
 
 impl History {
-    /// The scene was edited. Pictures are after that once the scene could be read.
+    /// Records an edit of the scene. New entries include it once the scene has been read.
     pub(super) fn edited(&mut self) {
         self.edits += 1;
     }
 
-    /// The scene could be read: pictures that are recorded from now on are after the last edit.
+    /// Records that the scene was read, so new entries include the last edit.
     pub(super) fn read(&mut self) {
         self.read_edits = self.edits;
     }
 
-    /// The scene is broken after all: pictures go on being of the one before.
+    /// Records that the scene is invalid after all: new entries still show the previous one.
     pub(super) fn broken(&mut self) {
         self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
-    /// Changes of files from the picture that is looked at to the newest one.
+    /// Changes in files between the render being looked at and the newest one.
     pub(super) fn edits_since_open(&self) -> String {
         let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
         let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
         edits.unwrap_or_default().join("; ")
     }
 
-    /// Changes from the picture before to the one that is looked at, in words for a line.
+    /// Why the render being looked at differs from the previous one, in one line.
     pub(super) fn reason_of_open(&self) -> String {
         let Some((at, _)) = &self.open else { return String::new() };
         let Some(past) = self.past.get(*at) else { return String::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
-            None => "the first picture".to_owned(),
-            Some(changes) if changes.is_empty() => AGAIN.to_owned(),
-            Some(changes) => format!("after {}", changes.join("; ")),
+            None => messages::OPENED.to_owned(),
+            Some(changes) if changes.is_empty() => messages::AGAIN.to_owned(),
+            Some(changes) => changes.join("; "),
         };
         past.marked(words)
     }
 
-    /// The camera that keys had moved since this request was written into the scene: an edit, which its pictures are after.
+    /// Records that the camera moved with keys since request `since` was written into the scene. This counts
+    /// as an edit that the entries since then include.
     pub(super) fn kept_camera(&mut self, since: u64) {
         self.edits += 1;
         self.read_edits = self.edits;
@@ -121,14 +118,15 @@ impl History {
         }
     }
 
-    /// The next request is the same picture as this one, shown otherwise: it takes its place.
+    /// Transfers the entry of a request to the next one, which shows the same image differently.
     pub(super) fn go_on(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
         }
     }
 
-    /// Keeps a picture, in place of an earlier one of the same request, and of the last one if both show the same image.
+    /// Adds an image. It replaces an earlier one of the same request, or the last entry if both show the same
+    /// image.
     pub(super) fn record(&mut self, shown: ShownImage, time: Instant, origin: ImageOrigin) {
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         let last = self.past.len().checked_sub(1);
@@ -137,10 +135,10 @@ impl History {
             Some(at) => {
                 let past = &self.past[at];
                 if known.is_none() {
-                    // What was edited since has changed nothing visible.
+                    // The edits since then changed nothing visible.
                     self.read_edits = past.edits;
                 }
-                // A picture keeps the origin that it had first.
+                // An image keeps its original origin.
                 let is_same = known.is_none() || past.shown.is_of_same_image(&shown);
                 let origin = if is_same { past.origin.of_same_image(origin) } else { origin };
                 self.replace(at, (shown, time), origin);
@@ -158,7 +156,7 @@ impl History {
         }
     }
 
-    /// Puts a picture in the place of another one of its request or of its image.
+    /// Replaces the image of an entry with another one of its request or image.
     fn replace(&mut self, at: usize, (shown, time): (ShownImage, Instant), origin: ImageOrigin) {
         let Some(past) = self.past.get_mut(at) else { return };
         let is_other_picture = past.shown.picture != shown.picture;
@@ -176,7 +174,7 @@ impl History {
         }
     }
 
-    /// Makes one of a finished picture and the one before it if both show the same image.
+    /// Merges a finished entry with the previous one if both show the same image.
     fn unite(&mut self, at: usize) {
         let Some(before) = at.checked_sub(1) else { return };
         let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
@@ -191,7 +189,7 @@ impl History {
             (past.edits, past.run, past.origin) = (edits, run, origin);
         }
         self.read_edits = edits;
-        // The first picture stays the first.
+        // The first entry stays the first.
         if before == 0
             && let Some(past) = self.past.get_mut(0)
         {
@@ -209,7 +207,7 @@ impl History {
         }
     }
 
-    /// Drops the picture of a request, unless a run has finished it.
+    /// Drops the entry of a request unless it was finished.
     pub(super) fn drop_unfinished(&mut self, generation: u64) {
         let is_it = |past: &HistoryEntry| past.shown.generation == generation && past.run.is_none();
         if let Some(at) = self.past.iter().position(is_it) {
@@ -217,29 +215,29 @@ impl History {
         }
     }
 
-    /// The newest picture was finished by this run.
+    /// Records that a render has finished the newest entry.
     pub(super) fn finish(&mut self, run: u64) {
         if let Some(newest) = self.past.back_mut() {
             newest.run = Some(run);
         }
     }
 
-    /// Whether the newest picture is of this request.
+    /// Whether the newest entry belongs to this request.
     pub(super) fn is_newest(&self, generation: u64) -> bool {
         self.past.back().is_some_and(|newest| newest.shown.generation == generation)
     }
 
-    /// Whether no run has finished the newest picture.
+    /// Whether the newest entry is not finished.
     pub(super) fn awaits_run(&self) -> bool {
         self.past.back().is_some_and(|newest| newest.run.is_none())
     }
 
-    /// Number of the run that finished a picture. `None` if none has.
+    /// Number of the render that finished an entry. `None` if none did.
     pub(super) fn run(&self, at: usize) -> Option<u64> {
         self.past.get(at)?.run
     }
 
-    /// Bytes of the pictures and of their scenes' texts, which pictures of one scene share.
+    /// Memory of the images and scene texts. Entries of the same scene share its text.
     fn bytes(&self) -> usize {
         let pictures: usize = self.past.iter().map(HistoryEntry::bytes).sum();
         let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
@@ -247,12 +245,12 @@ impl History {
         pictures + texts.values().sum::<usize>()
     }
 
-    /// Compares a picture's scene and settings with those of the picture before.
+    /// Compares scene and settings of an entry with the previous one.
     fn compare(&mut self, at: usize) {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.edits(&before.origin);
-        // The scene's keys tell of a camera that `c` wrote into it.
+        // If `c` wrote the camera, the change is listed as one of the scene's keys.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
         let keys = past.origin.toggles.differences(&before.origin.toggles, is_written);
         if let Some(past) = self.past.get_mut(at) {
@@ -260,28 +258,28 @@ impl History {
         }
     }
 
-    /// Scene and settings of the picture that is looked at. `None` if that is the newest one.
+    /// Scene and settings of the older render being looked at. `None` for the newest one.
     pub(super) fn origin_of_open(&self) -> Option<&ImageOrigin> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| &past.origin)
     }
 
-    /// Whether the oldest picture is looked at.
+    /// Whether the oldest render is being looked at.
     pub(super) fn is_oldest_open(&self) -> bool {
         self.open.as_ref().is_some_and(|(at, _)| *at == 0)
     }
 
-    /// Whether an older picture is looked at.
+    /// Whether an older render is being looked at.
     pub(super) fn is_open(&self) -> bool {
         self.open.is_some()
     }
 
-    /// The newest picture, while an older one is looked at.
+    /// The newest image while an older one is being looked at.
     pub(super) fn newest(&self) -> Option<ShownImage> {
         self.open.as_ref().map(|(_, newest)| newest.clone())
     }
 
-    /// There is a newer picture: whether an older one is looked at, so that it waits.
+    /// Stores a new image. Returns whether it stays hidden because an older one is being looked at.
     pub(super) fn holds_back(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
@@ -289,66 +287,66 @@ impl History {
         self.is_open()
     }
 
-    /// Goes so many pictures back; negative: forward.
+    /// Moves back by `back` entries, or forward if negative.
     pub(super) fn step(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
         self.look_at(next, newest)
     }
 
-    /// Whether so many pictures back, negative: forth, ends the look at older ones.
+    /// Whether moving back by `back` entries, or forward if negative, returns to the newest one.
     pub(super) fn leads_to_newest(&self, back: isize) -> bool {
         let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
-    /// The last picture from before the last edit that changed the picture.
+    /// Opens the last render before the last edit that changed the image.
     pub(super) fn before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
         self.look_at(at, newest)
     }
 
-    /// Number of pictures that are kept.
+    /// Number of entries.
     pub(super) fn len(&self) -> usize {
         self.past.len()
     }
 
-    /// The newest of the pictures that are kept.
+    /// Image of the newest entry.
     pub(super) fn last_picture(&self) -> Option<&Arc<Picture>> {
         self.past.back().map(|newest| &newest.shown.picture)
     }
 
-    /// Index of the picture that is looked at: the newest one, unless an older one is.
+    /// Index of the entry being looked at: the newest one unless an older one is open.
     pub(super) fn looked_at(&self) -> Option<usize> {
         self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
     }
 
-    /// A picture at a small size.
+    /// Thumbnail of an entry.
     pub(super) fn small(&self, at: usize) -> Option<&Picture> {
         let past = self.past.get(at)?;
         Some(past.small.get_or_init(|| small(&past.shown.picture)))
     }
 
-    /// Whether a picture is of this request.
+    /// Whether an entry belongs to this request.
     pub(super) fn is_of(&self, at: usize, generation: u64) -> bool {
         self.past.get(at).is_some_and(|past| past.shown.generation == generation)
     }
 
-    /// Changes from the picture before to this one, each in words: by edits, by keys. A picture whose render is under way has no
-    /// mark.
+    /// Changes from the previous entry in words: edits first, then keys. An entry whose render is running is
+    /// not marked as unfinished.
     pub(super) fn changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
         let Some(past) = self.past.get(at) else { return Vec::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
-            None => vec!["first".to_owned()],
-            Some(changes) if changes.is_empty() => vec![AGAIN.to_owned()],
+            None => vec![messages::OPENED.to_owned()],
+            Some(changes) if changes.is_empty() => vec![messages::AGAIN.to_owned()],
             Some(changes) => changes,
         };
-        let unfinished = (past.origin.is_unfinished && !is_under_way).then(|| UNFINISHED.to_owned());
+        let unfinished = (past.origin.is_unfinished && !is_under_way).then(|| messages::STOPPED.to_owned());
         unfinished.into_iter().chain(words).collect()
     }
 
-    /// One of the pictures that are kept.
+    /// Opens an entry.
     pub(super) fn open_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
         self.look_at(at, newest)
     }
@@ -359,12 +357,12 @@ impl History {
         Some(shown)
     }
 
-    /// Back to the newest one.
+    /// Returns to the newest image.
     pub(super) fn close(&mut self) -> Option<ShownImage> {
         self.open.take().map(|(_, newest)| newest)
     }
 
-    /// The run of the picture that is looked at, if it is an older one, and the time at which its render last improved it.
+    /// Render number of the older entry being looked at, and the time at which its image last improved.
     pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| (past.run, past.time))
@@ -372,18 +370,18 @@ impl History {
 }
 
 impl HistoryEntry {
-    /// Whether another picture is the same one. A picture in progress is not the finished one that it will be.
+    /// Whether another image is the same one. An image in progress differs from the finished one.
     fn is_same(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
             self.shown.is_of_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
-        // What is rendered may begin as it is and become another one.
+        // An unfinished image may look the same at first and then change.
         let may_change = origin.is_unfinished && !self.origin.is_unfinished;
         is_of_image || self.shown.picture == shown.picture && !may_change
     }
 
-    /// Words about it, with a mark if its render was stopped.
+    /// Adds a mark to `words` if the render was stopped.
     fn marked(&self, words: String) -> String {
-        if self.origin.is_unfinished { format!("{UNFINISHED}; {words}") } else { words }
+        if self.origin.is_unfinished { format!("{}: {words}", messages::STOPPED) } else { words }
     }
 
     fn bytes(&self) -> usize {
@@ -391,14 +389,14 @@ impl HistoryEntry {
     }
 }
 
-/// The same picture with at most [`SMALL`] columns and rows.
+/// Scales an image down to at most [`SMALL`] columns and rows.
 fn small(picture: &Picture) -> Picture {
     let scale = (SMALL / picture.width.max(picture.height).max(1) as f32).min(1.0);
     let side = |length: u32| ((length as f32 * scale).round() as u32).max(1);
     resized(picture, side(picture.width), side(picture.height))
 }
 
-/// Time that has passed, in words.
+/// Age in words.
 pub(super) fn ago(time: Duration) -> String {
     match time.as_secs() {
         seconds @ ..120 => format!("{seconds} s ago"),
@@ -428,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn the_oldest_go_where_memory_ends() {
+    fn oldest_entries_are_dropped_at_the_limit() {
         let mut history = History::default();
         for generation in 0..10 {
             let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
@@ -438,13 +436,13 @@ mod tests {
                 ImageOrigin::default(),
             );
         }
-        assert_eq!(history.past.len(), 5, "3 MB each");
+        assert_eq!(history.past.len(), 5, "3 MB per image");
         history.record(shown(10, 10_000), Instant::now(), ImageOrigin::default());
-        assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
+        assert_eq!(history.past.len(), 1, "the last one is always kept");
     }
 
     #[test]
-    fn texts_of_scenes_count_once_each() {
+    fn shared_scene_texts_count_once() {
         let mut history = History::default();
         let shared: Arc<str> = "x".repeat(3 << 20).into();
         let mut record = |generation: u64, text: Arc<str>| {
@@ -454,13 +452,13 @@ mod tests {
             history.past.len()
         };
         assert_eq!((0..8).map(|generation| record(generation, Arc::clone(&shared))).max(), Some(8));
-        // Five edits of 3 MiB beside the shared text are too many.
+        // Five edits of 3 MiB plus the shared text exceed the limit.
         assert_eq!((8..13).map(|generation| record(generation, "y".repeat(3 << 20).into())).max(), Some(12));
         assert_eq!(record(13, "z".into()), 6);
     }
 
     #[test]
-    fn what_looks_the_same_is_one_picture() {
+    fn equal_images_share_an_entry() {
         let mut history = History::default();
         for generation in 0..3 {
             history.edited();
@@ -469,9 +467,9 @@ mod tests {
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
 
-    /// More samples of the same picture begin with that picture.
+    /// A render that continues an image starts with that image.
     #[test]
-    fn an_unfinished_picture_is_not_the_finished_one_that_it_begins_with() {
+    fn unfinished_image_is_a_separate_entry() {
         let unfinished = ImageOrigin { is_unfinished: true, ..ImageOrigin::default() };
         let mut history = History::default();
         history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
@@ -483,25 +481,25 @@ mod tests {
         let better = ShownImage { picture: plain_picture(10, 10, [1, 2, 4]), ..shown(2, 10) };
         history.record(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
-        // In the end it may be the same after all.
+        // The finished image may still be equal.
         history.record(shown(2, 10), Instant::now(), ImageOrigin::default());
         assert_eq!(generations(&history), [2]);
     }
 
     #[test]
-    fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
+    fn edits_without_effect_are_skipped() {
         let mut history = History::default();
         history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
         history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
-        // A scene that is broken, and mended.
+        // The scene is broken, then fixed.
         edit(&mut history);
         history.broken();
         edit(&mut history);
         history.record(shown(4, 20), Instant::now(), ImageOrigin::default());
         let before = history.before_edit(shown(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
-        // Pictures by keys are after the same edit.
+        // Images changed with keys include the same edit.
         history.close();
         history.record(shown(5, 30), Instant::now(), ImageOrigin::default());
         let before = history.before_edit(shown(5, 30)).expect("a picture");
@@ -509,7 +507,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_of_the_last_good_scene_are_not_after_the_edit_that_broke_it() {
+    fn broken_edits_are_not_looked_back_over() {
         let mut history = History::default();
         history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
@@ -520,17 +518,17 @@ mod tests {
         assert_eq!(history.before_edit(shown(3, 30)).expect("a picture").generation, 1);
     }
 
-    /// A picture of an image, whose samples are there in part or all.
+    /// An image of which some or all samples are rendered.
     fn of_image(generation: u64, name: &str, is_finished: bool) -> (ShownImage, ImageOrigin) {
         let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
-        // No two previews are alike to the bit.
+        // No two previews are identical.
         let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };
         (ShownImage { source, picture, ..shown(generation, 10) }, origin)
     }
 
     #[test]
-    fn an_image_has_one_picture_however_often_its_render_is_interrupted() {
+    fn interrupted_renders_share_an_entry() {
         let mut history = History::default();
         let record = |history: &mut History, generation, name, is_finished| {
             let (shown, origin) = of_image(generation, name, is_finished);
@@ -538,15 +536,15 @@ mod tests {
             history.len()
         };
         assert_eq!(record(&mut history, 1, "first", true), 1);
-        // A comment: the same image again.
+        // Edit a comment: same image.
         edit(&mut history);
         assert_eq!(record(&mut history, 2, "first", true), 1);
-        // Rendered again, interrupted by a typo, and finished from the samples that it had.
+        // Render again, interrupt with a typo, then finish with the existing samples.
         assert_eq!(record(&mut history, 3, "first", false), 2);
         assert_eq!(record(&mut history, 4, "first", false), 2);
         assert_eq!(record(&mut history, 5, "first", true), 1);
         assert_eq!(changes(&history), ["first"]);
-        // An edit takes the samples: what there was of the image stays, once.
+        // An edit discards the samples; the unfinished image is kept once.
         edit(&mut history);
         assert_eq!(record(&mut history, 6, "second", false), 2);
         assert_eq!(record(&mut history, 7, "second", false), 2);
@@ -556,7 +554,7 @@ mod tests {
     }
 
     #[test]
-    fn pictures_are_numbered_by_the_runs_that_finished_them() {
+    fn entries_have_the_number_of_their_render() {
         let mut history = History::default();
         for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
             let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
@@ -565,7 +563,7 @@ mod tests {
             run.into_iter().for_each(|run| history.finish(run));
         }
         assert_eq!([0, 1, 2].map(|at| history.run(at)), [Some(1), None, Some(2)]);
-        // Found again by a later run.
+        // A later request finds the same image.
         let (shown, origin) = of_image(4, "3", true);
         history.record(shown, Instant::now(), origin);
         assert!(!history.awaits_run());
@@ -579,25 +577,25 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_was_kept_is_an_edit() {
+    fn keeping_the_camera_counts_as_an_edit() {
         let mut history = History::default();
         history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
         history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
         history.kept_camera(2);
         let before = history.before_edit(shown(3, 30)).expect("a picture");
-        assert_eq!(before.generation, 1, "of the camera before");
+        assert_eq!(before.generation, 1, "the previous camera");
     }
 
     #[test]
-    fn one_request_has_one_picture() {
+    fn one_request_has_one_entry() {
         let mut history = History::default();
         history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
         history.record(shown(1, 20), Instant::now(), ImageOrigin::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
-    /// A scene with this text, and settings by keys.
+    /// A scene with this text and view.
     fn origin(text: &str, view: Option<View>) -> ImageOrigin {
         let toggles = Toggles { view, ..Toggles::default() };
         ImageOrigin { toggles, text: Some(text.into()), ..ImageOrigin::default() }
@@ -608,12 +606,12 @@ mod tests {
     }
 
     #[test]
-    fn each_picture_says_what_changed_since_the_one_before() {
+    fn entries_list_the_changes_since_the_previous() {
         let mut history = History::default();
         let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
         let seed = "camera.fov = 30\nseed = 1";
         history.record(shown(1, 10), Instant::now(), origin(wide, None));
-        // Two saves, of which one alone can be read.
+        // Two saves, only one of which could be read.
         history.edited();
         history.edited();
         history.record(shown(2, 20), Instant::now(), origin(narrow, None));
@@ -629,7 +627,7 @@ mod tests {
     }
 
     #[test]
-    fn a_camera_that_is_written_into_the_scene_is_told_once() {
+    fn kept_camera_is_listed_once() {
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = Toggles { camera, ..Toggles::default() };
@@ -650,7 +648,7 @@ mod tests {
     }
 
     #[test]
-    fn a_save_that_changes_no_picture_is_no_cause_of_the_one_before_it() {
+    fn saves_without_effect_are_not_listed() {
         let mut history = History::default();
         let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
             let (shown, origin) = of_image(generation, name, is_finished);
@@ -663,18 +661,18 @@ mod tests {
         record(&mut history, 3, "on", true, first, Some(true));
         let words = ["first", "photons off", "photons on"];
         assert_eq!(changes(&history), words);
-        // The call sets another number of samples: the picture is the same. It is found again, or shown on the way.
+        // The number of samples is overridden by the command line, so the image is the same.
         edit(&mut history);
         record(&mut history, 4, "on", true, second, Some(true));
         assert_eq!(changes(&history), words);
         record(&mut history, 5, "on", false, "render.samples = 8", Some(true));
         record(&mut history, 5, "on", true, "render.samples = 8", Some(true));
         assert_eq!(changes(&history), words);
-        // The picture after that has the changes of both.
+        // The next image lists both changes.
         edit(&mut history);
         record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
         assert_eq!(changes(&history)[3], "render.samples 64 → 8; + radius = 1");
-        // The scene's keys tell of a camera that `c` wrote into the scene.
+        // If `c` wrote the camera, the change is listed as one of the scene's keys.
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
         let (shown, origin) = of_image(7, "fov", true);
@@ -691,12 +689,12 @@ mod tests {
     }
 
     #[test]
-    fn an_entry_keeps_the_words_of_the_edit_that_made_its_picture() {
+    fn entry_keeps_its_original_changes() {
         let mut history = History::default();
         let mut generation = 0;
         let mut record = |history: &mut History, name: &str, toggles: Toggles, text: &str| {
             generation += 1;
-            // Shown on its way, at the end, and once more.
+            // In progress, at the end, and once more.
             for _ in 0..3 {
                 let (shown, origin) = of_image(generation, name, true);
                 history.record(
@@ -716,7 +714,7 @@ mod tests {
         assert_eq!(record(&mut history, "wide", keys, output), words);
         let named = format!("{output}\nname = \"globe\"");
         assert_eq!(record(&mut history, "wide", keys, &named), words);
-        // A camera that keys have moved is not the one that is saved. One that the scene has by now is.
+        // A camera moved with keys is not the saved one, unless the scene has it by now.
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = Toggles { camera, ..Toggles::default() };
@@ -731,7 +729,7 @@ mod tests {
     }
 
     #[test]
-    fn files_that_the_scene_names_are_told_by_name() {
+    fn changed_files_are_listed_by_name() {
         let file = |name: &str, hash: u8| FileRead { path: name.into(), content: Content::Hash([hash; 32]) };
         let files = |bricks, knot| -> Arc<[FileRead]> {
             [file("textures/bricks.png", bricks), file("knot.obj", knot)].into()
@@ -746,7 +744,7 @@ mod tests {
     }
 
     #[test]
-    fn small_pictures_are_made_anew_when_their_pictures_change() {
+    fn thumbnails_follow_their_images() {
         let mut history = History::default();
         history.record(shown(1, 1000), Instant::now(), ImageOrigin::default());
         let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
@@ -757,7 +755,7 @@ mod tests {
     }
 
     #[test]
-    fn times_in_words() {
+    fn ages_in_words() {
         for (seconds, words) in [(0, "0 s ago"), (119, "119 s ago"), (120, "2 min ago"), (7300, "2 h ago")] {
             assert_eq!(ago(Duration::from_secs(seconds)), words);
         }

@@ -1,20 +1,20 @@
-//! The one table of keys: what they do and what the help says of them.
+//! Key bindings and their help texts.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::action::Action;
 use super::event::KeyPress;
 
-/// One line of a table.
+/// One row of a key table.
 pub(super) struct Binding<A = Action> {
-    /// The keys that do it.
+    /// Keys with this binding.
     pub keys: &'static [KeyPress],
-    /// Labels of the keys in the help; empty if the line before has them.
+    /// Label in the help; empty if the previous row covers it.
     pub label: &'static str,
     pub action: A,
-    /// Effect of the keys, for the help; empty if the line before tells it.
+    /// Description in the help; empty if the previous row covers it.
     pub help: &'static str,
-    /// One word for the line of keys; empty: not there.
+    /// One word for the line of keys; empty to leave the key out.
     pub hint: &'static str,
 }
 
@@ -33,36 +33,36 @@ const RIGHT: KeyPress = KeyPress::special(KeyCode::Right);
 const UP: KeyPress = KeyPress::special(KeyCode::Up);
 const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 
-/// Every key, in the order of the help.
+/// All keys, in the order of the help.
 pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", ""),
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", ""),
-    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on, off", ""),
+    binding(&[KeyPress::plain('p')], "p", Action::TogglePhotons, "photons on or off", ""),
     binding(&[KeyPress::plain('i')], "i", Action::CycleIntegrator, "integrator: whitted, path", ""),
     binding(
         &[KeyPress::plain('v')],
         "v",
         Action::NextView,
-        "next view, and a list of them: 1-9 choose; V: previous view",
+        "next view, with a list (1-9 choose); V: previous view",
         "",
     ),
-    binding(&[KeyPress::special(KeyCode::Tab)], "tab", Action::PictureAlone, "the picture alone", "picture"),
+    binding(&[KeyPress::special(KeyCode::Tab)], "tab", Action::PictureAlone, "show only the image", "image"),
     binding(&[KeyPress::plain('V')], "", Action::PreviousView, "", ""),
-    binding(&[KeyPress::plain('x')], "x", Action::CloseUp, "pixels 1:1 around the crosshair, and back", ""),
+    binding(&[KeyPress::plain('x')], "x", Action::CloseUp, "actual pixels (1:1) around the crosshair", ""),
     binding(
         &[KeyPress::plain('z')],
         "z",
         Action::RectangleFirst,
-        "drag what to render first; z z: at the crosshair; z: end",
+        "render a region first (drag); z again: around the crosshair",
         "",
     ),
     binding(
         &[LEFT, KeyPress::plain('h')],
         "arrows hjkl",
         Action::OrbitLeft,
-        "orbit the camera; a drag too",
+        "orbit the camera (or drag)",
         "",
     ),
     binding(&[DOWN, KeyPress::plain('j')], "", Action::OrbitDown, "", ""),
@@ -72,37 +72,25 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('+'), KeyPress::plain('=')],
         "+ -",
         Action::DollyIn,
-        "the camera nearer, farther; the wheel too",
+        "move closer / farther (or wheel)",
         "",
     ),
     binding(&[KeyPress::plain('-')], "", Action::DollyOut, "", ""),
-    binding(&[KeyPress::plain('<')], "< >", Action::NarrowField, "field of view narrower, wider", ""),
+    binding(&[KeyPress::plain('<')], "< >", Action::NarrowField, "narrower / wider field of view", ""),
     binding(&[KeyPress::plain('>')], "", Action::WidenField, "", ""),
-    binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "exposure: darker, brighter", ""),
+    binding(&[KeyPress::plain('[')], "[ ]", Action::Darken, "darker / brighter exposure", ""),
     binding(&[KeyPress::plain(']')], "", Action::Brighten, "", ""),
-    binding(&[KeyPress::plain('f')], "f", Action::Focus, "click to focus there; f f: at the crosshair", ""),
+    binding(&[KeyPress::plain('f')], "f", Action::Focus, "focus at a click; f again: at the crosshair", ""),
     binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
-    binding(
-        &[KeyPress::plain('u')],
-        "u",
-        Action::UndoCamera,
-        "undo c, if the file is still as c left it",
-        "",
-    ),
+    binding(&[KeyPress::plain('u')], "u", Action::UndoCamera, "undo the last c", ""),
     binding(
         &[KeyPress::special(KeyCode::Enter)],
         "Enter, click",
         Action::Inspect,
-        "inspect the object there",
+        "inspect the object at the crosshair or mouse",
         "",
     ),
-    binding(
-        &[KeyPress::plain('y')],
-        "y",
-        Action::Copy,
-        "copy what a click said: radiance too, and the pixel's place",
-        "",
-    ),
+    binding(&[KeyPress::plain('y')], "y", Action::Copy, "copy the inspected values", ""),
     binding(
         &[KeyPress::plain('o')],
         "o",
@@ -110,7 +98,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         "open the editor at the error or the clicked object",
         "",
     ),
-    binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on, off (to select text)", ""),
+    binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on or off (off to select text)", ""),
     binding(
         &[KeyPress::plain('b')],
         "b",
@@ -122,23 +110,24 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('n')],
         "n N",
         Action::OlderPicture,
-        "older, newer pictures; a click in the strip too",
+        "older / newer render (or click in the history)",
         "",
     ),
     binding(&[KeyPress::plain('N')], "N", Action::NewerPicture, "", ""),
-    binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
+    binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause or resume the render", "pause"),
     binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
-    binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the newest image as it is now", "write"),
+    binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the newest image now", "write"),
     binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "reset to the scene's settings", "reset"),
     binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
-    binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "draw the screen anew", ""),
-    binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),
+    binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "redraw the screen", ""),
+    binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "suspend to the shell", ""),
     binding(&[KeyPress::ctrl('c')], "ctrl-c", Action::Interrupt, "interrupt, exit code 130", ""),
 ];
 
-/// Actions of keys while the help, the errors or the list of views are open; they come before the usual actions.
+/// Actions of keys while the help, the errors or the list of views are open. They take precedence over other
+/// actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Overlay {
+pub(super) enum OverlayAction {
     LineUp,
     LineDown,
     PageUp,
@@ -150,50 +139,50 @@ pub(super) enum Overlay {
     Close,
 }
 
-/// The keys of what lies over the picture.
-pub(super) const OVERLAY: &[Binding<Overlay>] = &[
+/// Keys of the overlays.
+pub(super) const OVERLAY: &[Binding<OverlayAction>] = &[
     binding(
         &[KeyPress::plain('j'), KeyPress::special(KeyCode::Down)],
         "j k",
-        Overlay::LineDown,
-        "or down, up: scroll help, errors; choose a view",
+        OverlayAction::LineDown,
+        "or down, up: scroll help and errors; choose a view",
         "scroll",
     ),
-    binding(&[KeyPress::plain('k'), KeyPress::special(KeyCode::Up)], "", Overlay::LineUp, "", ""),
+    binding(&[KeyPress::plain('k'), KeyPress::special(KeyCode::Up)], "", OverlayAction::LineUp, "", ""),
     binding(
         &[KeyPress::special(KeyCode::PageDown)],
         "PgDn PgUp",
-        Overlay::PageDown,
-        "scroll them by a page",
+        OverlayAction::PageDown,
+        "scroll by a page",
         "page",
     ),
-    binding(&[KeyPress::special(KeyCode::PageUp)], "", Overlay::PageUp, "", ""),
-    binding(&[LEFT, KeyPress::plain('h')], "", Overlay::ColumnLeft, "", ""),
-    binding(&[RIGHT, KeyPress::plain('l')], "", Overlay::ColumnRight, "", ""),
+    binding(&[KeyPress::special(KeyCode::PageUp)], "", OverlayAction::PageUp, "", ""),
+    binding(&[LEFT, KeyPress::plain('h')], "", OverlayAction::ColumnLeft, "", ""),
+    binding(&[RIGHT, KeyPress::plain('l')], "", OverlayAction::ColumnRight, "", ""),
     binding(
         &[KeyPress::special(KeyCode::Enter)],
         "Enter /",
-        Overlay::Take,
-        "the list of views: close it; find a name",
+        OverlayAction::Take,
+        "in the view list: Enter close, / search",
         "",
     ),
-    binding(&[KeyPress::plain('/')], "", Overlay::Find, "", ""),
+    binding(&[KeyPress::plain('/')], "", OverlayAction::Find, "", ""),
     binding(
         &[KeyPress::special(KeyCode::Esc)],
         "esc",
-        Overlay::Close,
-        "close what is open; back to the newest picture",
+        OverlayAction::Close,
+        "close the overlay; back to the newest render",
         "close",
     ),
 ];
 
-/// The action of a key on an overlay, if it has one.
-pub(super) fn overlay(key: KeyPress) -> Option<Overlay> {
+/// The overlay action of a key.
+pub(super) fn overlay(key: KeyPress) -> Option<OverlayAction> {
     OVERLAY.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// The action of a key, if it has one. Terminals differ in whether they report shift beside a capital or `?`, so shift does not
-/// count for characters.
+/// The action of a key. Terminals disagree on whether they report shift with a capital letter or `?`, so
+/// shift is ignored for characters.
 pub(super) fn action(key: KeyPress) -> Option<Action> {
     let modifiers = match key.code {
         KeyCode::Char(_) => key.modifiers - KeyModifiers::SHIFT,
@@ -203,7 +192,7 @@ pub(super) fn action(key: KeyPress) -> Option<Action> {
     KEYMAP.iter().find(|binding| binding.keys.contains(&key)).map(|binding| binding.action)
 }
 
-/// The line of an action; every action has one.
+/// The row of an action; every action has one.
 pub(super) fn of(action: Action) -> Option<&'static Binding> {
     KEYMAP.iter().find(|binding| binding.action == action)
 }
@@ -213,7 +202,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_key_means_two_things() {
+    fn keys_are_bound_once() {
         let keys: Vec<_> = KEYMAP.iter().flat_map(|binding| binding.keys).collect();
         let overlay: Vec<_> = OVERLAY.iter().flat_map(|binding| binding.keys).collect();
         for keys in [keys, overlay] {
@@ -224,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn shift_beside_a_character_does_not_count_and_ctrl_does() {
+    fn shift_is_ignored_for_characters() {
         let shifted = KeyPress { code: KeyCode::Char('?'), modifiers: KeyModifiers::SHIFT };
         assert_eq!(action(shifted), Some(Action::ToggleHelp));
         assert_eq!(action(KeyPress::plain('V')), Some(Action::PreviousView));
@@ -233,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fixed_keys_are_there() {
+    fn documented_keys_are_bound() {
         for key in "?qsdpiv rw0hjkl+-<>[]fcombnNxzeuy".chars() {
             assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
         }

@@ -18,6 +18,7 @@ mod graphics;
 mod history;
 mod input;
 mod keymap;
+pub mod messages;
 mod mosaic;
 mod noise_curve;
 mod options;

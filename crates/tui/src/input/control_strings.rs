@@ -1,11 +1,11 @@
-//! Reports of a terminal in strings: its name, its colors, its abilities.
+//! Terminal replies in control strings: name, colors and capabilities.
 
 use crate::graphics::Protocol;
 use crate::pixel_request::QUERY_ID;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::TerminalId;
 
-/// A report in a control string (DCS) as it comes.
+/// A device control string (DCS) being received.
 #[derive(Debug, Default)]
 pub(super) struct ControlString {
     kind: ReportKind,
@@ -16,17 +16,17 @@ pub(super) struct ControlString {
 enum ReportKind {
     #[default]
     Other,
-    /// XTVERSION: name and version.
+    /// Name and version (XTVERSION).
     Name,
-    /// XTGETTCAP: a capability that the terminal has.
+    /// A supported capability (XTGETTCAP).
     Capability,
 }
 
-/// Longer ones say nothing that is of use.
+/// Maximum length; longer strings contain nothing useful.
 const LONGEST: usize = 256;
 
 impl ControlString {
-    /// One that begins with these.
+    /// Starts a control string with these parameters.
     pub(super) fn begin(intermediates: &[u8], first: u16, action: char) -> Self {
         let kind = match (intermediates, action) {
             (b">", '|') => ReportKind::Name,
@@ -52,13 +52,13 @@ impl ControlString {
     }
 }
 
-/// Whether a capability is `RGB` or `Tc`; names are in hexadecimal digits.
+/// Whether a capability is `RGB` or `Tc`. Names are in hexadecimal.
 fn has_true_color(text: &[u8]) -> bool {
     let names = text.split(|byte| *byte == b';').filter_map(|item| item.split(|byte| *byte == b'=').next());
     names.into_iter().any(|name| name == b"524742" || name == b"5463")
 }
 
-/// An operating system command (OSC): a color of the palette or the background.
+/// Parses an operating system command (OSC): a palette or background color.
 pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
     let color = |text: &[u8]| color(std::str::from_utf8(text).ok()?);
     let answer = match params {
@@ -71,7 +71,7 @@ pub(super) fn command(params: &[&[u8]]) -> TerminalReply {
     answer.unwrap_or(TerminalReply::Other)
 }
 
-/// An application program command (APC): kitty's answer to a question about images.
+/// Parses an application program command (APC): kitty's reply to the image query.
 pub(super) fn application(text: &[u8]) -> TerminalReply {
     let of_query = format!("Gi={QUERY_ID};OK");
     if text == of_query.as_bytes() { TerminalReply::Images(Protocol::Kitty) } else { TerminalReply::Other }
@@ -81,7 +81,7 @@ fn number(text: &[u8]) -> Option<u8> {
     std::str::from_utf8(text).ok()?.parse().ok()
 }
 
-/// `rgb:r/g/b` or `rgba:r/g/b/a`, each of 1 to 4 hexadecimal digits, as X11 writes colors; or `#rrggbb`.
+/// Parses an X11 color: `rgb:r/g/b` or `rgba:r/g/b/a` with 1 to 4 hexadecimal digits each, or `#rrggbb`.
 fn color(text: &str) -> Option<[u8; 3]> {
     if let Some(digits) = text.strip_prefix('#').filter(|digits| digits.len() == 6 && digits.is_ascii()) {
         let channel = |i: usize| u8::from_str_radix(&digits[2 * i..2 * i + 2], 16).ok();
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colors_as_x11_writes_them() {
+    fn x11_colors_are_parsed() {
         assert_eq!(color("rgb:ffff/8080/0000"), Some([255, 128, 0]));
         assert_eq!(color("rgb:f/8/0"), Some([255, 136, 0]));
         assert_eq!(color("rgba:1c1c/1c1c/1c1c/ffff"), Some([28, 28, 28]));
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn capabilities_by_their_names() {
+    fn capabilities_are_found_by_name() {
         assert!(has_true_color(b"524742=38"));
         assert!(has_true_color(b"5463"));
         assert!(!has_true_color(b"544e=787465726d"));

@@ -1,14 +1,14 @@
-//! Decoded input of the terminal.
+//! Decoded terminal input.
 
 use crate::event::{Event, KeyPress, Mouse};
 use crate::terminal_replies::TerminalReply;
 
-/// One thing that the terminal sent.
+/// Input from the terminal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum DecodedInput {
     Key(KeyPress),
     Mouse(Mouse),
-    /// Text was pasted; what it was is not kept.
+    /// Pasted text; its content is not kept.
     Paste,
     TerminalReply(TerminalReply),
 }

@@ -1,7 +1,7 @@
-//! Bytes as they come, split anywhere, into inputs.
+//! Decodes terminal input that may be split anywhere.
 //!
-//! The escape character is a key and the beginning of nearly everything else; only time tells. What begins and does
-//! not end in time is given up, so that no byte can hold the keyboard.
+//! An escape character is both a key and the start of most sequences; only timing tells them apart. A
+//! sequence that does not end in time is dropped, so no byte can block the keyboard.
 
 use std::time::{Duration, Instant};
 
@@ -13,60 +13,61 @@ use super::paste::Paste;
 use crate::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
-/// Bytes after an escape character with which a terminal begins a sequence: CSI, OSC, SS3, DCS, SOS, PM, APC, and the end of a string.
+/// Bytes that follow the escape character in a terminal's sequences: CSI, OSC, SS3, DCS, SOS, PM, APC, and
+/// the string terminator.
 const INTRODUCERS: &[u8] = b"[]OPX^_\\";
-/// After this much silence an escape character was the key.
+/// Silence after which an escape character is taken as the key.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
-/// A sequence goes on within this time. Lines that lose packets are this slow.
+/// Timeout between bytes of a sequence, for connections that lose packets.
 const SEQUENCE: Duration = Duration::from_secs(1);
-/// A sequence ends within this time and length, whatever comes: alt and `]` begin one that no key ends.
+/// Maximum duration and length of a sequence: alt-`]` starts one that no key ends.
 const LONGEST: Duration = Duration::from_secs(2);
 const MOST_BYTES: usize = 4096;
-/// Time after an escape key within which `[` can still show that a sequence began.
+/// Time after an escape key during which `[` may still be part of a sequence.
 const REGRET: Duration = Duration::from_secs(2);
-/// Time that such a `[` waits for the next byte; and most bytes kept in doubt.
+/// Time to wait for the byte after such a `[`, and the maximum number of bytes held back.
 const DOUBT: Duration = Duration::from_millis(300);
 const LONGEST_ANSWER: usize = 32;
 
-/// Turns bytes into inputs.
+/// Decodes bytes into input.
 #[derive(Default)]
 pub(crate) struct Decoder {
     parser: vte::Parser,
     meaning: KeyParser,
     held: PendingSequence,
-    /// When the last byte came.
+    /// Time of the last byte.
     last: Option<Instant>,
-    /// When silence made a key of an escape character.
+    /// Time at which an escape character was taken as the key.
     escaped: Option<Instant>,
-    /// Text of the application program command (APC) under way, which the parser ignores.
+    /// Text of the current application program command (APC), which the parser ignores.
     command: Vec<u8>,
 }
 
-/// A sequence that has begun and not ended.
+/// A sequence that has started and not ended.
 #[derive(Debug, Default)]
 enum PendingSequence {
     #[default]
     Nothing,
-    /// An escape character alone.
+    /// An escape character.
     Escape,
-    /// An escape character in a string, which it ends.
+    /// An escape character that ends a string.
     StringEnd,
-    /// A sequence that began then and has so many bytes. `introducer`: the byte after the escape character.
+    /// A sequence with its start time and length. `introducer` is the byte after the escape character.
     Sequence {
         begin: Instant,
         bytes: usize,
         introducer: u8,
     },
-    /// Perhaps the rest of a sequence whose escape character was taken for the key; else these keys.
+    /// Possibly the rest of a sequence whose escape character was taken as the key, or just these keys.
     Doubtful(Vec<u8>),
     Paste(Paste),
 }
 
 impl Decoder {
-    /// Decodes these bytes, together with those before.
+    /// Decodes bytes that continue the previous ones.
     pub(crate) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<DecodedInput> {
-        // An escape character and a doubt are not over: what had to follow them is here, if late. Nor is a paste: its text
-        // may have waited for a busy reader, which is no silence.
+        // An escape character or doubtful bytes do not expire here: what follows them has arrived, if late.
+        // Neither does a paste: its text may have waited for a busy reader.
         if matches!(self.held, PendingSequence::Sequence { .. }) {
             self.expire_into_found(now);
         }
@@ -77,7 +78,7 @@ impl Decoder {
         std::mem::take(&mut self.meaning.found)
     }
 
-    /// When [`Decoder::expire`] has something to do.
+    /// Time at which [`Decoder::expire`] must be called.
     pub(super) fn deadline(&self) -> Option<Instant> {
         let after = |wait| self.last.map(|last| last + wait);
         match &self.held {
@@ -90,7 +91,7 @@ impl Decoder {
         }
     }
 
-    /// Decodes silence.
+    /// Handles silence.
     pub(super) fn expire(&mut self, now: Instant) -> Vec<DecodedInput> {
         self.expire_into_found(now);
         std::mem::take(&mut self.meaning.found)
@@ -105,7 +106,7 @@ impl Decoder {
                 }
                 PendingSequence::Doubtful(bytes) => self.replay(&bytes),
                 PendingSequence::Paste(_) => self.meaning.found.push(DecodedInput::Paste),
-                // Nothing followed: two keys.
+                // Nothing followed, so these are two keys.
                 PendingSequence::Sequence { bytes: 2, introducer, .. } => {
                     self.press_escape();
                     self.replay(&[introducer]);
@@ -173,7 +174,7 @@ impl Decoder {
                 self.press_escape();
                 self.held = PendingSequence::Escape;
             }
-            // No terminal sends a sequence that goes on like this.
+            // No terminal sends such a sequence.
             byte if !INTRODUCERS.contains(&byte) => {
                 self.give_up();
                 self.press_escape();
@@ -183,7 +184,7 @@ impl Decoder {
         }
     }
 
-    /// The next byte of a sequence that began then, has so many bytes with this one, and has this introducer.
+    /// Continues a sequence with one more byte.
     fn go_on(&mut self, byte: u8, (begin, bytes, introducer): (Instant, usize, u8), now: Instant) {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
@@ -216,7 +217,7 @@ impl Decoder {
         }
     }
 
-    /// Forgets what began.
+    /// Drops the current sequence.
     fn give_up(&mut self) -> PendingSequence {
         self.meaning.forget();
         self.command.clear();
@@ -233,10 +234,10 @@ impl Decoder {
     }
 }
 
-/// Whether a byte right behind these two is a key, as are they: it does not continue any sequence that a terminal sends.
+/// Whether the byte after these two is a key, and so are they: no terminal sends such a sequence.
 fn is_key_behind(introducer: u8, byte: u8) -> bool {
     match introducer {
-        // rxvt has `a` to `d` for shifted arrows; `n` and `t` end reports.
+        // rxvt uses `a` to `d` for shifted arrows; `n` and `t` end reports.
         b'[' => matches!(byte, b'e'..=b'm' | b'o'..=b's' | b'u'..=b'~'),
         b']' => !byte.is_ascii_digit() && byte != ESCAPE,
         b'P' => byte.is_ascii_lowercase(),

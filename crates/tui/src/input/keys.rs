@@ -1,4 +1,4 @@
-//! Sequences as keys and answers (ECMA-48; xterm, "ctlseqs").
+//! Translates control sequences into keys and replies (ECMA-48; xterm, "ctlseqs").
 
 use crossterm::event::{KeyCode, KeyModifiers};
 use vte::{Params, Perform};
@@ -9,34 +9,34 @@ use crate::event::{KeyPress, Mouse, MouseKind};
 use crate::graphics::Protocol;
 use crate::terminal_replies::TerminalReply;
 
-/// The parser's callbacks; holds the meaning of what was read last.
+/// Callbacks of the parser, which collect the decoded input.
 #[derive(Debug, Default)]
 pub(super) struct KeyParser {
     /// Decoded input, in order.
     pub found: Vec<DecodedInput>,
     /// Whether a sequence has ended, known or not.
     pub has_ended: bool,
-    /// Whether text began to be pasted.
+    /// Whether a paste has started.
     pub is_paste: bool,
     next: NextCharacter,
     report: ControlString,
 }
 
-/// Kind of the next character.
+/// Meaning of the next character.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum NextCharacter {
     #[default]
     Character,
-    /// The end of a key that began with SS3 (`ESC O`): arrows of some terminals, F1 to F4.
+    /// Last byte of an SS3 key (`ESC O`): arrows of some terminals, F1 to F4.
     SingleShift,
-    /// The end of a function key of the Linux console (`ESC [ [`).
+    /// Last byte of a function key of the Linux console (`ESC [ [`).
     Console,
-    /// One of so many bytes of a report of the mouse in its oldest form.
+    /// Remaining bytes of a mouse report in the original format.
     Mouse(u8),
 }
 
 impl KeyParser {
-    /// Drops the sequence that has begun.
+    /// Drops the current sequence.
     pub(super) fn forget(&mut self) {
         self.next = NextCharacter::Character;
         self.is_paste = false;
@@ -46,12 +46,13 @@ impl KeyParser {
         self.found.push(DecodedInput::Key(KeyPress { code, modifiers }));
     }
 
-    /// An application program command has ended.
+    /// Handles a complete application program command.
     pub(super) fn end_command(&mut self, text: &[u8]) {
         self.answer(control_strings::application(text));
     }
 
-    /// A report in SGR form (mode 1006): the button with bits for what else is, and the cell from 1.
+    /// Handles a mouse report in SGR format (mode 1006): button with modifier bits, and the cell counted from
+    /// 1.
     fn mouse(&mut self, code: u16, (column, row): (u16, u16), is_pressed: bool) {
         const MODIFIERS: u16 = 4 | 8 | 16;
         let kind = match (code & !MODIFIERS, is_pressed) {
@@ -60,7 +61,7 @@ impl KeyParser {
             (32, true) => MouseKind::Drag,
             (64, true) => MouseKind::WheelUp,
             (65, true) => MouseKind::WheelDown,
-            // Other buttons.
+            // Other buttons are ignored.
             _ => return self.answer(TerminalReply::Other),
         };
         let (column, row) = (column.saturating_sub(1), row.saturating_sub(1));
@@ -121,7 +122,7 @@ impl Perform for KeyParser {
                 self.next = NextCharacter::SingleShift;
                 return;
             }
-            // The end of a string, or an unknown one.
+            // A string terminator or an unknown sequence.
             _ => {}
         }
         self.has_ended = true;
@@ -141,11 +142,11 @@ impl Perform for KeyParser {
                 self.answer(TerminalReply::Attributes);
             }
             (b"?$", 'y') if first == 2026 => {
-                // 1: set, 2: reset; others: not known, or it cannot be changed.
+                // 1 means set and 2 reset; other values mean unknown or permanent.
                 self.answer(TerminalReply::Synchronized { is_known: matches!(second, 1 | 2) });
             }
             ([], '~') if first == 200 => self.is_paste = true,
-            // A paste that was over before its end came.
+            // The end of a paste that had already expired.
             ([], '~') if first == 201 => {}
             ([], '~') => {
                 if let Some(code) = numbered_key(first) {
@@ -161,10 +162,10 @@ impl Perform for KeyParser {
                 self.next = NextCharacter::Mouse(3);
                 self.has_ended = false;
             }
-            // With two numbers it is where the cursor is, not F3.
+            // With two numbers it is a cursor position report, not F3.
             ([], 'R') if params.len() > 1 => self.answer(TerminalReply::Other),
             ([], 'I' | 'O') => self.answer(TerminalReply::Focus { is_here: action == 'I' }),
-            // The window's size.
+            // Window size report.
             ([], 't') => self.answer(TerminalReply::Other),
             ([], letter) => {
                 if let Some(code) = letter_key(letter) {
@@ -196,6 +197,7 @@ impl Perform for KeyParser {
     }
 }
 
+/// Key of a CSI or SS3 sequence that ends with this letter.
 fn letter_key(letter: char) -> Option<KeyCode> {
     Some(match letter {
         'A' => KeyCode::Up,
@@ -229,7 +231,7 @@ fn numbered_key(number: u16) -> Option<KeyCode> {
     })
 }
 
-/// xterm's number: one more than shift 1, alt 2, ctrl 4, super 8.
+/// Decodes xterm's modifier parameter: 1 plus shift 1, alt 2, ctrl 4, super 8.
 fn modifiers(number: u16) -> KeyModifiers {
     let bits = number.saturating_sub(1);
     [(1, KeyModifiers::SHIFT), (2, KeyModifiers::ALT), (4, KeyModifiers::CONTROL), (8, KeyModifiers::SUPER)]

@@ -1,7 +1,7 @@
-//! Input from the terminal: keys, pasted text, and the terminal's answers.
+//! Terminal input: keys, pasted text and replies.
 //!
-//! One thread polls the terminal and reads whatever is there, so that nothing waits for the next byte. [`Decoder`]
-//! turns bytes into [`DecodedInput`], and is the one place that knows how keys are encoded.
+//! One thread polls the terminal and reads whatever is available, so nothing waits for another byte.
+//! [`Decoder`] turns bytes into [`DecodedInput`] and is the only place that knows how keys are encoded.
 
 mod control_strings;
 mod decoded;
@@ -23,7 +23,7 @@ pub(super) use self::decoded::DecodedInput;
 pub(super) use self::decoder::Decoder;
 use super::event::{Event, EventSource};
 
-/// Reads standard input, on a thread of its own, until it ends: then [`EventSource::Keys`] is lost.
+/// Reads standard input on a separate thread. Reports the loss of [`EventSource::Keys`] when it ends.
 ///
 /// # Errors
 /// The system has no thread left.
@@ -44,16 +44,16 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether what is typed is for another program.
+/// Whether another program reads the input.
 static HELD: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
-/// Leaves what is typed from now on to another program, or takes it again.
+/// Leaves the input to another program, or takes it back.
 pub(super) fn hold(is_held: bool) {
     *HELD.0.lock().unwrap_or_else(PoisonError::into_inner) = is_held;
     HELD.1.notify_all();
 }
 
-/// Waits for as long as what is typed is another program's; whether it was.
+/// Waits while another program reads the input. Returns whether one did.
 fn was_held() -> bool {
     let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
     let was_held = *held;
@@ -61,7 +61,7 @@ fn was_held() -> bool {
     was_held
 }
 
-/// Input of the next bytes; empty if there are none while the decoder waits. `None` if the terminal is gone.
+/// Reads and decodes input; empty after a timeout. `None` if the terminal is gone.
 fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait(decoder.deadline());
@@ -80,7 +80,7 @@ fn read(bytes: &mut [u8]) -> nix::Result<Option<usize>> {
     nix::unistd::read(io::stdin().as_fd(), bytes).map(Some)
 }
 
-/// Waits for bytes, until the deadline if there is one; whether there are any, or the end.
+/// Waits for input until the deadline, if any. Returns whether there is input or its end.
 fn wait(deadline: Option<Instant>) -> nix::Result<bool> {
     let stdin = io::stdin();
     let mut ends = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];

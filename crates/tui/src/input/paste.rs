@@ -1,34 +1,35 @@
-//! Bracketed paste: text between two marks, which is skipped.
+//! Bracketed paste: text between two markers, which is ignored.
 //!
-//! If the closing mark never comes (the line broke, a program in between swallowed it), the keyboard must not be held for ever.
-//! The paste is over after a second without text; once it has taken ten seconds or 1 MiB, after a fifth of a second. It is never
-//! over while text comes: the rest would count as keys. Control sequences do not count as text: the terminal's answers come all
-//! the time while a picture is drawn. Bytes that come later count as keys again, and a late closing mark does nothing.
+//! The keyboard must not be blocked forever if the end marker is lost on the way. A paste expires after one
+//! second without text, or after 200 ms once it has lasted ten seconds or exceeds 1 MiB. It never expires
+//! while text arrives, because the rest would count as keys. Control sequences are not text, since the
+//! terminal sends replies continuously while a preview is drawn. After that, bytes count as keys again and a
+//! late end marker has no effect.
 
 use std::time::{Duration, Instant};
 
 const SILENCE: Duration = Duration::from_secs(1);
-/// The silence that ends what is longer than a paste is expected to be.
+/// Silence that ends an unusually long paste.
 const SHORT_SILENCE: Duration = Duration::from_millis(200);
 const LONG: Duration = Duration::from_secs(10);
 const MANY_BYTES: usize = 1 << 20;
 const END: &[u8] = b"\x1b[201~";
 
-/// A paste under way.
+/// A paste in progress.
 #[derive(Debug)]
 pub(super) struct Paste {
     begin: Instant,
     last: Instant,
     bytes: usize,
-    /// Bytes of the closing mark that have been seen.
+    /// Matched bytes of the end marker.
     matched: usize,
     sequence: ControlSequence,
 }
 
-/// State of a control sequence.
+/// Parser state of a control sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ControlSequence {
-    /// There is none.
+    /// Outside of a sequence.
     Outside,
     /// After ESC.
     Escape,
@@ -37,7 +38,7 @@ enum ControlSequence {
 }
 
 impl ControlSequence {
-    /// State after one more byte. `None` if the byte is text.
+    /// The state after one more byte. `None` if the byte is text.
     fn after(self, byte: u8) -> Option<Self> {
         match (self, byte) {
             (Self::Outside | Self::Escape | Self::Parameters, 0x1b) => Some(Self::Escape),
@@ -54,13 +55,13 @@ impl Paste {
         Self { begin: now, last: now, bytes: 0, matched: 0, sequence: ControlSequence::Outside }
     }
 
-    /// When it is over if nothing more comes.
+    /// Time at which the paste expires if nothing more arrives.
     pub(super) fn deadline(&self) -> Instant {
         let long_at = if self.bytes >= MANY_BYTES { self.last } else { self.begin + LONG };
         (self.last + SILENCE).min(long_at.max(self.last + SHORT_SILENCE))
     }
 
-    /// Takes one byte; whether it ended the closing mark.
+    /// Takes one byte. Returns whether it completed the end marker.
     pub(super) fn takes_last(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.after(byte);
         if sequence.is_none() {
@@ -68,7 +69,7 @@ impl Paste {
         }
         self.sequence = sequence.unwrap_or(ControlSequence::Outside);
         self.bytes = self.bytes.saturating_add(1);
-        // No suffix of the mark's beginnings is a beginning of the mark but ESC itself.
+        // No suffix of a partial marker is a prefix of the marker except ESC itself.
         self.matched = match byte {
             _ if END[self.matched] == byte => self.matched + 1,
             0x1b => 1,

@@ -9,7 +9,7 @@ use crate::graphics::Protocol;
 use crate::terminal_replies::TerminalReply;
 use crate::terminals::{Brand, TerminalId};
 
-/// A decoder and its clock.
+/// A decoder with a simulated clock.
 struct DecoderBench {
     decoder: Decoder,
     now: Instant,
@@ -24,7 +24,7 @@ impl DecoderBench {
         self.decoder.decode(bytes, self.now)
     }
 
-    /// Silence, as the reader sees it: it wakes at each deadline.
+    /// Simulates silence, with a wakeup at each deadline.
     fn wait(&mut self, milliseconds: u64) -> Vec<DecodedInput> {
         let end = self.now + Duration::from_millis(milliseconds);
         let mut inputs = Vec::new();
@@ -57,7 +57,7 @@ const READY: DecodedInput = DecodedInput::TerminalReply(TerminalReply::Ready);
 const ESC: DecodedInput = DecodedInput::Key(KeyPress::special(KeyCode::Esc));
 
 #[test]
-fn keys_are_what_xterm_sends_for_them() {
+fn keys_are_decoded_as_xterm_sends_them() {
     use KeyModifiers as With;
     for (bytes, input) in [
         (&b"q"[..], plain('q')),
@@ -92,7 +92,7 @@ fn keys_are_what_xterm_sends_for_them() {
 }
 
 #[test]
-fn answers_are_told_from_keys() {
+fn replies_are_not_keys() {
     for (bytes, answer) in [
         (&b"\x1b[0n"[..], TerminalReply::Ready),
         (b"\x1b[?62;1;2;22c", TerminalReply::Attributes),
@@ -134,7 +134,7 @@ fn answers_are_told_from_keys() {
 }
 
 #[test]
-fn the_left_button_and_the_wheel_are_heard() {
+fn left_button_and_wheel_are_decoded() {
     use MouseKind::{Drag, Press, Release, WheelDown, WheelUp};
     for (bytes, kind) in [
         (&b"\x1b[<0;10;20M"[..], Press),
@@ -153,12 +153,12 @@ fn the_left_button_and_the_wheel_are_heard() {
 }
 
 #[test]
-fn the_oldest_form_of_the_mouse_is_no_keys() {
+fn original_mouse_format_is_not_keys() {
     assert_eq!(read(b"\x1b[M q!q"), [plain('q')]);
 }
 
 #[test]
-fn an_escape_character_is_the_key_when_nothing_follows() {
+fn lone_escape_is_a_key() {
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b"), []);
     assert_eq!(bench.wait(49), []);
@@ -170,7 +170,7 @@ fn an_escape_character_is_the_key_when_nothing_follows() {
 }
 
 #[test]
-fn sixels_are_an_attribute() {
+fn sixel_support_is_an_attribute() {
     let answers =
         [TerminalReply::Images(Protocol::Sixel), TerminalReply::Attributes].map(DecodedInput::TerminalReply);
     assert_eq!(read(b"\x1b[?62;4;22c"), answers);
@@ -179,13 +179,13 @@ fn sixels_are_an_attribute() {
 }
 
 #[test]
-fn answers_about_images_eat_no_keys() {
+fn image_replies_do_not_swallow_keys() {
     let keys = b"q\x1b_Gi=4211;OK\x1b\\s";
     assert_eq!(
         read(keys),
         [plain('q'), DecodedInput::TerminalReply(TerminalReply::Images(Protocol::Kitty)), plain('s')]
     );
-    // The end of the answer is late.
+    // The end of the reply is late.
     let mut bench = DecoderBench::new();
     assert_eq!(
         bench.read(b"\x1b_Gi=4211;OK\x1b"),
@@ -195,9 +195,9 @@ fn answers_about_images_eat_no_keys() {
     assert_eq!(bench.read(b"\\s"), [plain('s')]);
 }
 
-/// No key has alt: a character right behind an escape character is a key of its own.
+/// Alt is not used: a character right after an escape character is a separate key.
 #[test]
-fn escape_and_a_quick_key_are_two_keys() {
+fn escape_and_a_fast_key_are_two_keys() {
     for key in (b' '..0x7f).filter(|byte| !b"[]OPX^_\\".contains(byte)) {
         let key = char::from(key);
         let bytes = [b"\x1b".as_slice(), key.to_string().as_bytes(), b"q"].concat();
@@ -213,7 +213,7 @@ fn escape_and_a_quick_key_are_two_keys() {
     assert_eq!(read(b"\x1b[s"), [ESC, plain('['), plain('s')]);
     assert_eq!(read(b"\x1bPp"), [ESC, plain('P'), plain('p')]);
     assert_eq!(read(b"\x1b[As\x1bs"), [special(KeyCode::Up), plain('s'), ESC, plain('s')]);
-    // The beginning of a sequence that does not go on.
+    // Incomplete sequences.
     for key in ['[', ']', 'P', 'O', 'X', '_'] {
         let mut bench = DecoderBench::new();
         assert_eq!(bench.read(format!("\x1b{key}").as_bytes()), []);
@@ -223,7 +223,7 @@ fn escape_and_a_quick_key_are_two_keys() {
 }
 
 #[test]
-fn what_follows_an_escape_character_late_is_still_its_sequence() {
+fn late_bytes_continue_an_escape_sequence() {
     for (rest, input) in [
         (&b"[0n"[..], READY),
         (b"[A", special(KeyCode::Up)),
@@ -244,7 +244,7 @@ fn what_follows_an_escape_character_late_is_still_its_sequence() {
 }
 
 #[test]
-fn a_bracket_typed_after_the_escape_key_is_a_key() {
+fn bracket_after_escape_is_a_key() {
     let after_escape = || {
         let mut bench = DecoderBench::new();
         bench.read(b"\x1b");
@@ -266,7 +266,7 @@ fn a_bracket_typed_after_the_escape_key_is_a_key() {
 }
 
 #[test]
-fn a_paste_is_one_event_and_its_text_is_no_keys() {
+fn paste_is_one_event_without_keys() {
     assert_eq!(read(b"a\x1b[200~q\x1b[20\x1b[201~b"), [plain('a'), DecodedInput::Paste, plain('b')]);
     let mut bench = DecoderBench::new();
     for byte in b"\x1b[200~quit\x1b[A\x03" {
@@ -277,12 +277,12 @@ fn a_paste_is_one_event_and_its_text_is_no_keys() {
 }
 
 #[test]
-fn a_paste_without_an_end_is_over_by_silence() {
+fn silence_ends_an_unterminated_paste() {
     let mut bench = DecoderBench::new();
     bench.read(b"\x1b[200~qqq");
     assert_eq!(bench.wait(999), []);
     assert_eq!(bench.wait(1), [DecodedInput::Paste]);
-    assert_eq!(bench.read(b"q\x1b[201~"), [plain('q')], "a late end is nothing");
+    assert_eq!(bench.read(b"q\x1b[201~"), [plain('q')], "a late end marker is ignored");
 
     bench.read(b"\x1b[200~");
     let keys = (0..30).flat_map(|_| {
@@ -291,29 +291,25 @@ fn a_paste_without_an_end_is_over_by_silence() {
         inputs
     });
     let keys: Vec<DecodedInput> = keys.collect();
-    assert_eq!(
-        (keys[0], keys[1]),
-        (DecodedInput::Paste, plain('q')),
-        "somebody presses a key again and again"
-    );
+    assert_eq!((keys[0], keys[1]), (DecodedInput::Paste, plain('q')), "a key is pressed repeatedly");
 
     let long = [&b"\x1b[200~"[..], &vec![b'q'; (1 << 20) + 3]].concat();
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(&long), []);
     assert_eq!(bench.wait(199), []);
-    assert_eq!(bench.wait(1), [DecodedInput::Paste], "after so much a short silence is enough");
+    assert_eq!(bench.wait(1), [DecodedInput::Paste], "a short silence ends a long paste");
     assert_eq!(bench.read(b"q"), [plain('q')]);
 }
 
 #[test]
-fn nothing_of_a_long_paste_is_a_key() {
+fn long_paste_contains_no_keys() {
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~"), []);
     for _ in 0..3000 {
         assert_eq!(bench.read(&[b'q'; 1000]), []);
         assert_eq!(bench.wait(5), []);
     }
-    assert_eq!(bench.read(b"q\x1b[201~c"), [DecodedInput::Paste, plain('c')], "3 MB, 15 s");
+    assert_eq!(bench.read(b"q\x1b[201~c"), [DecodedInput::Paste, plain('c')], "3 MB in 15 s");
 
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~"), []);
@@ -321,20 +317,20 @@ fn nothing_of_a_long_paste_is_a_key() {
         assert_eq!(bench.read(b"q"), []);
         assert_eq!(bench.wait(100), []);
     }
-    assert_eq!(bench.read(b"q\x1b[201~c"), [DecodedInput::Paste, plain('c')], "over a thin line");
+    assert_eq!(bench.read(b"q\x1b[201~c"), [DecodedInput::Paste, plain('c')], "over a slow connection");
 }
 
 #[test]
-fn text_that_waited_for_the_reader_is_still_of_its_paste() {
+fn delayed_text_belongs_to_its_paste() {
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~q"), []);
-    // Nobody looked in between, so nobody knows that there was silence.
+    // Nothing was read in between, so there was no observed silence.
     bench.now += Duration::from_secs(60);
     assert_eq!(bench.read(b"q\x1b[201~"), [DecodedInput::Paste]);
 }
 
 #[test]
-fn answers_do_not_keep_a_paste_open() {
+fn replies_do_not_extend_a_paste() {
     let mut bench = DecoderBench::new();
     assert_eq!(bench.read(b"\x1b[200~q"), []);
     let mut found = Vec::new();
@@ -342,12 +338,12 @@ fn answers_do_not_keep_a_paste_open() {
         found.extend(bench.read(b"\x1b[0n"));
         found.extend(bench.wait(150));
     }
-    assert_eq!(found[0], DecodedInput::Paste, "a second after the last text");
+    assert_eq!(found[0], DecodedInput::Paste, "one second after the last text");
     assert_eq!(bench.read(b"q"), [plain('q')]);
 }
 
 #[test]
-fn a_sequence_without_an_end_is_given_up() {
+fn unterminated_sequence_is_dropped() {
     for begun in [&b"\x1b]0;t"[..], b"\x1bP1", b"\x1b[1;", b"\x1bXx", b"\x1b[M"] {
         let mut bench = DecoderBench::new();
         assert_eq!(bench.read(begun), []);
@@ -361,13 +357,13 @@ fn a_sequence_without_an_end_is_given_up() {
         keys.extend(bench.read(b"q"));
         bench.wait(300);
     }
-    assert!(!keys.is_empty(), "somebody presses a key again and again");
+    assert!(!keys.is_empty(), "a key is pressed repeatedly");
     let long = [&b"\x1bP"[..], &vec![b'q'; 5000]].concat();
-    assert!(read(&long).contains(&plain('q')), "a string has its length");
+    assert!(read(&long).contains(&plain('q')), "strings have a maximum length");
 }
 
 #[test]
-fn invalid_text_takes_no_key_with_it() {
+fn invalid_text_does_not_swallow_keys() {
     for broken in [&b"\xc3"[..], b"\xe2\x96", b"\xf0\x90\x80", b"\xff", b"\x80", b"\xe2\x1b[A"] {
         let inputs = read(&[broken, b"q"].concat());
         assert_eq!(inputs.last(), Some(&plain('q')), "{broken:?}");
@@ -375,9 +371,9 @@ fn invalid_text_takes_no_key_with_it() {
 }
 
 proptest! {
-    /// However a text of keys and answers is split, the same comes out.
+    /// Input is decoded the same way however it is split.
     #[test]
-    fn splits_do_not_count(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
+    fn splits_do_not_matter(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
         let words: [&[u8]; 10] =
             [b"q", b"\x1b[A", b"\x1b[0n", b"\x1b[?62;22c", "é".as_bytes(), b"\x1bOP", b"\x1b[5~", b"\x03", b"\x1b[200~q\x1b[201~", b"\x1b[3;4R"];
         let text: Vec<u8> = parts.iter().flat_map(|part| words[*part]).copied().collect();
@@ -395,9 +391,9 @@ proptest! {
         prop_assert_eq!(split, whole);
     }
 
-    /// Whatever comes, a key after a while is a key.
+    /// After arbitrary bytes and a pause, a key is decoded as a key.
     #[test]
-    fn nothing_holds_the_keyboard(bytes in prop::collection::vec(prop_oneof![Just(0x1b_u8), Just(b'['), Just(b']'), Just(b'P'), any::<u8>()], 0..300)) {
+    fn no_input_blocks_the_keyboard(bytes in prop::collection::vec(prop_oneof![Just(0x1b_u8), Just(b'['), Just(b']'), Just(b'P'), any::<u8>()], 0..300)) {
         let mut bench = DecoderBench::new();
         bench.read(&bytes);
         bench.wait(12_000);

@@ -1,4 +1,4 @@
-//! The terminal: its window, its colors, and the means by which pictures are shown.
+//! State of the terminal: window, colors, and how previews are drawn.
 
 use std::time::{Duration, Instant};
 
@@ -12,29 +12,29 @@ use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
 use crate::terminals::Capabilities;
 
-/// The terminal as far as it is known.
+/// What is known about the terminal.
 pub(crate) struct DisplayState {
     pub window: Window,
     pub kind: PreviewKind,
     pub depth: ColorDepth,
     pub shades: ColorMapper,
-    /// The terminal's 16 colors.
+    /// The terminal's 16 ANSI colors.
     pub ansi: AnsiColors,
-    /// Questions to the terminal.
+    /// Queries that were sent.
     pub ask: TerminalQueries,
-    /// Abilities of the terminal besides text.
+    /// Capabilities beyond text.
     pub capabilities: Capabilities,
-    /// Time after which the end of a render is worth a notification. `None` for none.
+    /// Minimum duration of a render whose end is worth a notification. `None` for no notifications.
     pub notify_after: Option<Duration>,
-    /// Whether its window has the focus, as far as it says.
+    /// Whether the window has the focus, as far as the terminal reports it.
     pub has_focus: bool,
-    /// Whether the terminal's background is light.
+    /// Whether the background is light.
     pub is_light: bool,
-    /// Pixels that the user wants and the terminal has not confirmed.
+    /// Pixels that the user requested and the terminal has not confirmed.
     pub pixels: Option<PixelRequest>,
-    /// Time at which the user is told that the terminal has not answered.
+    /// Time at which a missing confirmation is reported.
     pub pixels_until: Option<Instant>,
-    /// Cost of the last frame.
+    /// Cost of the last preview.
     pub frame: Option<FrameReport>,
 }
 
@@ -58,13 +58,14 @@ impl DisplayState {
         }
     }
 
-    /// Pixels of the preview in the width of a cell.
+    /// Pixels of the preview per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
-        /// More are not worth their bytes.
+        /// More pixels are not worth their bytes.
         const MOST: u32 = 10;
-        /// Pixels of the whole window: summing, developing and encoding those of its picture takes some 45 bytes each.
+        /// Maximum pixels of the window: accumulating, developing and encoding a preview takes about 45 bytes
+        /// per pixel.
         const MOST_PIXELS: f32 = 2_400_000.0;
-        /// The same for sixels, which themselves take as much again.
+        /// Maximum pixels for sixels, which take as much memory again.
         const MOST_IN_SIXELS: f32 = 1_600_000.0;
         match self.kind {
             PreviewKind::Pixels(protocol) => {
@@ -81,7 +82,7 @@ impl DisplayState {
         }
     }
 
-    /// Whether colors are mixed from those that the terminal has.
+    /// Whether colors are dithered.
     pub(crate) fn mixes_colors(&self) -> bool {
         matches!(self.depth, ColorDepth::Indexed256 | ColorDepth::Ansi16)
             || self.kind == PreviewKind::Pixels(Protocol::Sixel)

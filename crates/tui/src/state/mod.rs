@@ -1,4 +1,4 @@
-//! The state of the front end, in parts. `update` alone changes it.
+//! The state of the front end. Only `update` changes it.
 
 mod display;
 mod overlays;
@@ -26,26 +26,26 @@ use super::terminals::Capabilities;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Values that the front end starts with.
+/// Initial values of the state.
 pub(super) struct Setup {
     pub scene: PathBuf,
     pub overrides: Overrides,
     pub window: Window,
     pub preview: PreviewKind,
     pub depth: ColorDepth,
-    /// Whether the environment says that the terminal's background is light.
+    /// Whether the environment indicates a light background.
     pub is_light: bool,
-    /// Likely values of the 16 colors.
+    /// Likely ANSI colors.
     pub ansi: AnsiColors,
-    /// Questions to the terminal.
+    /// Queries that were sent.
     pub ask: TerminalQueries,
-    /// Abilities of the terminal besides text, by the environment.
+    /// Capabilities beyond text, according to the environment.
     pub capabilities: Capabilities,
-    /// Time after which the end of a render is worth a notification. `None` for none.
+    /// Minimum duration of a render whose end is worth a notification. `None` for no notifications.
     pub notify_after: Option<Duration>,
 }
 
-/// The whole state.
+/// The complete state.
 pub(super) struct State {
     pub request: RequestState,
     pub work: WorkState,
@@ -55,12 +55,12 @@ pub(super) struct State {
     pub selection: SelectionState,
     pub overlays: OverlayState,
 
-    /// The time of the newest event.
+    /// Time of the newest event.
     pub now: Instant,
     /// Whether the screen is out of date.
     pub dirty: bool,
-    /// Whether the next frame is the first picture of a request or the answer to a key, which do not wait for their
-    /// turn.
+    /// Whether the next frame shows the first preview of a request or the response to a key, so it is drawn
+    /// without delay.
     pub urgent: bool,
 }
 
@@ -80,11 +80,11 @@ impl State {
         }
     }
 
-    /// Whether the last step of the camera has no picture yet.
+    /// Whether the last camera step has no preview yet.
     pub(super) fn awaits_step(&self) -> bool {
         let Self { request, work, picture, .. } = self;
         let is_shown = picture.shown.as_ref().is_some_and(|shown| shown.generation == request.generation);
-        // While the scene is broken, the last good one is rendered.
+        // While the scene is broken, the last valid one is rendered.
         let is_at_work = match work.activity {
             Activity::Running { .. } => true,
             Activity::Waiting | Activity::Broken => request.camera.is_some() && self.work_goes_on(),
@@ -94,7 +94,7 @@ impl State {
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
     }
 
-    /// Errors and warnings about a scene that could be read, and why its picture is not on disk.
+    /// Diagnostics of a valid scene, and why its image is not on disk.
     pub(super) fn reported(&self) -> Vec<Diagnostic> {
         let warnings = &self.overlays.warnings;
         let failed = self.saving.write_failed.as_ref();
@@ -109,23 +109,23 @@ impl State {
         unwritten.into_iter().chain(warnings.iter().cloned()).collect()
     }
 
-    /// Whether the scene failed, not the work.
+    /// Whether the scene failed, not its render.
     fn work_goes_on(&self) -> bool {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 
-    /// Shows the list of views for a moment more.
+    /// Shows the list of views for another moment.
     pub(super) fn list_views(&mut self) {
         self.overlays.list_views(self.now);
         self.dirty = true;
     }
 
-    /// Pauses the request's clock, or lets it go on.
+    /// Pauses or resumes the request's clock.
     pub(super) fn set_paused(&mut self, paused: bool) {
         self.work.set_paused(paused, self.now);
     }
 
-    /// Time at which the state needs the next tick, if nothing else happens.
+    /// Time of the next tick that the state needs.
     pub(super) fn next_tick(&self) -> Option<Instant> {
         const CLOCK: Duration = Duration::from_millis(250);
         const AGE: Duration = Duration::from_secs(1);
@@ -133,7 +133,7 @@ impl State {
         let bars = self.work.assets.iter().filter_map(AssetBar::end).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
-        // An older picture grows older.
+        // The age of an older render changes.
         let age = self.picture.history.is_open().then(|| self.now + AGE);
         let pixels = self.display.pixels_until;
         [clock, age, self.request.resize_due, bars, views, notice, pixels].into_iter().flatten().min()

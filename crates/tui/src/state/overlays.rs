@@ -1,29 +1,29 @@
-//! Text over the picture: messages, errors and warnings, the help, the list of views.
+//! Text over the image: messages, diagnostics, help, and the list of views.
 
 use std::time::{Duration, Instant};
 
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::is_absence;
 
-/// Errors because of which the picture does not show the current file.
+/// Errors that keep the preview from showing the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Problems {
-    /// Errors and warnings with places.
+    /// Diagnostics with source positions.
     pub diagnostics: Vec<Diagnostic>,
-    /// A failure without a place.
+    /// A failure without a position.
     pub work: Option<String>,
 }
 
-/// The list of views, while it is shown.
+/// The open list of views.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ViewList {
-    /// Time at which the list closes by itself.
+    /// Time at which the list closes automatically.
     pub until: Instant,
-    /// Letters of a name, typed after `/`. `None` unless the list is being searched.
+    /// Search text typed after `/`. `None` if no search is active.
     pub name: Option<String>,
 }
 
-/// Text over the picture that can be scrolled.
+/// A scrollable pane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Pane {
     pub open: bool,
@@ -35,18 +35,18 @@ pub(crate) struct Pane {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Message {
     pub words: String,
-    /// Time at which it disappears without a key. `None` for a fault or a prompt.
+    /// Time at which it disappears. `None` for errors and prompts, which stay until a key is pressed.
     pub until: Option<Instant>,
 }
 
-/// Texts, and the panes that show them.
+/// Messages, diagnostics and panes.
 #[derive(Default)]
 pub(crate) struct OverlayState {
     /// The last message, until the next key.
     pub message: Option<Message>,
-    /// Errors of the scene. `None` while the scene is valid.
+    /// Errors of the scene. `None` while it is valid.
     pub problems: Option<Problems>,
-    /// Errors in a file that may still be being written.
+    /// Errors in a file that may still be incomplete.
     pub unconfirmed: Option<Vec<Diagnostic>>,
     pub warnings: Vec<Diagnostic>,
     /// Whether the warnings belong to the newest request.
@@ -63,7 +63,7 @@ impl OverlayState {
         self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
     }
 
-    /// Shows the list of views for a moment more.
+    /// Shows the list of views for another moment.
     pub(crate) fn list_views(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);
         let name = self.views.take().and_then(|views| views.name);

@@ -1,15 +1,15 @@
-//! The picture on the screen, and the pictures before it.
+//! The image on the screen and the history.
 
 use crate::history::{History, ShownImage};
 use crate::pipeline::protocol::Spot;
 
-/// The picture on the screen, and how it is looked at.
+/// The image on the screen, and how it is shown.
 #[derive(Default)]
 pub(crate) struct PictureState {
     pub shown: Option<ShownImage>,
     pub history: History,
-    /// Place around which the image is shown pixel by pixel. `None` if all of the image is shown.
+    /// Position around which the image is shown pixel by pixel. `None` if the whole image is shown.
     pub close_up: Option<Spot>,
-    /// Whether the picture has the screen for itself.
+    /// Whether only the image is shown.
     pub is_alone: bool,
 }

@@ -1,4 +1,4 @@
-//! The newest request to the worker, and what it is made of.
+//! The newest request and its inputs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::sanitize::visible;
 use crate::scene::{changes, is_mesh};
 
-/// Settings that keys changed, on top of the command line.
+/// Settings changed with keys, which override the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Toggles {
     pub shadows: Option<Shadows>,
@@ -26,7 +26,7 @@ pub(crate) struct Toggles {
 }
 
 impl Toggles {
-    /// The same as options of a call. A camera in an orbiter file cannot be set in one.
+    /// The same settings as command-line options. A camera from an orbiter file has no option.
     pub(crate) fn options(&self, has_orbiter: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
@@ -55,7 +55,8 @@ impl Toggles {
         options
     }
 
-    /// Settings that differ from those before, in words; without a camera that the scene has by now, if `is_camera_written`.
+    /// Settings that differ from `before`, in words. Leaves out a camera reset if `is_camera_written`,
+    /// because the scene now has that camera.
     pub(crate) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
         let camera = self.camera.is_any().then(|| "moved".to_owned());
@@ -71,14 +72,14 @@ impl Toggles {
         ];
         let differing = || all.iter().filter(|(_, differs, _)| *differs);
         let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
-        // Settings that are the scene's own again stand together.
+        // Settings that were reset are listed together.
         let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
         let back = (!back.is_empty()).then(|| format!("{} reset", listed(&back)));
         now.chain(back).collect()
     }
 }
 
-/// Names in a sentence: `a`, `a and b`, `a, b and c`.
+/// Joins names: `a`, `a and b`, `a, b and c`.
 fn listed(names: &[&str]) -> String {
     match names {
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
@@ -86,27 +87,27 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-/// Scene and settings that a picture was made of.
+/// Scene and settings that an image was rendered with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ImageOrigin {
-    /// Settings that keys had changed.
+    /// Settings changed with keys.
     pub toggles: Toggles,
     /// Text of the scene file. `None` for a model.
     pub text: Option<Arc<str>>,
-    /// The other files of the scene.
+    /// Other files of the scene.
     pub files: Arc<[FileRead]>,
-    /// Whether its render was not over.
+    /// Whether its render has not finished.
     pub is_unfinished: bool,
 }
 
 impl ImageOrigin {
-    /// The same in any exposure: of the same light.
+    /// The origin without the exposure, which does not affect the render.
     pub(crate) fn of_light(self) -> Self {
         Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
     }
 
-    /// Origin of an image that a later request has as well: what has changed since had no part in it. But a camera that keys had
-    /// moved, and that the scene has by now, is the scene's.
+    /// Origin of an image that a later request found again: later changes had no effect on it. But if the
+    /// camera moved with keys is now in the scene, the later origin is returned.
     pub(crate) fn of_same_image(&self, later: Self) -> Self {
         if self.toggles.camera.is_any() && !later.toggles.camera.is_any() {
             return later;
@@ -114,7 +115,7 @@ impl ImageOrigin {
         Self { is_unfinished: later.is_unfinished, ..self.clone() }
     }
 
-    /// Changes of the files since another one, in words.
+    /// Changes in the files since `before`, in words.
     pub(crate) fn edits(&self, before: &Self) -> Vec<String> {
         let texts = before.text.as_deref().zip(self.text.as_deref());
         let of_text = texts.map(|(old, new)| changes(old, new)).unwrap_or_default();
@@ -128,7 +129,7 @@ impl ImageOrigin {
     }
 }
 
-/// Stops of exposure, with their sign.
+/// Stops of exposure with a sign.
 pub(crate) fn signed_stops(stops: f32) -> String {
     match stops {
         0.0 => "0".to_owned(),
@@ -137,51 +138,52 @@ pub(crate) fn signed_stops(stops: f32) -> String {
     }
 }
 
-/// A step of the camera. Steps come faster than pictures: the newest step waits until the step before has its first picture.
+/// A camera step. Steps arrive faster than previews, so the newest step waits until the previous one has its
+/// first preview.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct CameraStep {
     /// Generation of the step's request.
     pub generation: Option<u64>,
-    /// Whether there is a newer step.
+    /// Whether a newer step is waiting.
     pub is_waiting: bool,
 }
 
-/// The newest request: scene, settings, and what the worker found out about them.
+/// The newest request: scene, settings, and what the worker reported about them.
 pub(crate) struct RequestState {
     pub scene: PathBuf,
-    /// Overrides of the command line.
+    /// Overrides from the command line.
     pub command_line: Overrides,
     pub toggles: Toggles,
 
-    /// Number of the newest request.
+    /// Generation of the newest request.
     pub generation: u64,
     /// Toggles of the newest request.
     pub sent_toggles: Toggles,
-    /// Whether the newest request differs from the one before in its exposure alone.
+    /// Whether the newest request differs from the previous one only in its exposure.
     pub is_exposure_only: bool,
     /// Preview size of the newest request.
     pub preview_size: Option<PreviewSize>,
-    /// Time at which another preview size is requested.
+    /// Time at which a new preview size is requested.
     pub resize_due: Option<Instant>,
-    /// Part of the image that is rendered before the rest.
+    /// Section of the image that is rendered first.
     pub first_section: Option<Section>,
     pub camera_step: CameraStep,
-    /// First request of a camera that keys have moved.
+    /// First request with a camera moved with keys.
     pub moved_since: Option<u64>,
-    /// Parts of the camera that keys have changed, as the scene had them when a key first changed them.
+    /// The moved parts of the camera as they were in the scene before the first move.
     pub moved_from: CameraChange,
 
-    /// Text of the scene file, in the newest request that was understood.
+    /// Text of the scene file in the newest valid request.
     pub text: Option<Arc<str>>,
-    /// The other files of the scene.
+    /// Other files of the scene.
     pub files: Arc<[FileRead]>,
-    /// Settings that hold, as the worker reports them.
+    /// Effective settings, as reported by the worker.
     pub effective: Option<Effective>,
-    /// The scene's own camera, in the newest request that was understood.
+    /// The scene's own camera in the newest valid request.
     pub camera: Option<Viewpoint>,
-    /// The scene's own exposure, in stops.
+    /// The scene's own exposure in stops.
     pub exposure: Option<f32>,
-    /// The scene's other settings that keys change.
+    /// Other settings of the scene that keys can change.
     pub own: Option<OwnSettings>,
 }
 
@@ -209,13 +211,14 @@ impl RequestState {
         }
     }
 
-    /// Notes the files that the newest request is made of. The text of a scene is compared by itself; a model has none.
+    /// Records the input files of the newest request. The text of a scene is compared separately; models have
+    /// no text.
     pub(crate) fn note_files(&mut self, files: Vec<FileRead>) {
         let is_model = is_mesh(&self.scene);
         self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
     }
 
-    /// Description of what the newest request shows.
+    /// Origin of the image that the newest request renders.
     pub(crate) fn origin(&self, is_unfinished: bool) -> ImageOrigin {
         ImageOrigin {
             toggles: self.sent_toggles,
@@ -225,7 +228,7 @@ impl RequestState {
         }
     }
 
-    /// The scene's settings as the command line and the keys change them.
+    /// Overrides from the command line and keys together.
     pub(crate) fn overrides(&self) -> Overrides {
         let mut overrides = self.command_line.clone();
         overrides.shadows = self.toggles.shadows.or(overrides.shadows);
@@ -238,12 +241,12 @@ impl RequestState {
         overrides
     }
 
-    /// Overrides of the scene's own image, if keys show something else.
+    /// Overrides of the scene's own image, if keys show a different one.
     pub(crate) fn own_overrides(&self) -> Option<Box<Overrides>> {
         (!self.is_own()).then(|| Box::new(self.command_line.clone()))
     }
 
-    /// Drops changes by keys that the scene has by now, after a save.
+    /// Drops changes made with keys that a save has put into the scene.
     pub(crate) fn drop_saved_changes(&mut self) {
         let (shadows, integrator, photons) =
             (self.base_shadows(), self.base_integrator(), self.base_photons());
@@ -257,12 +260,13 @@ impl RequestState {
         self.toggles.exposure.take_if(|now| Some(*now) == exposure);
     }
 
-    /// The camera as the keys have it. `None` until a scene has been understood.
+    /// The camera including changes made with keys. `None` until a valid scene has been read.
     pub(crate) fn viewpoint(&self) -> Option<Viewpoint> {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
     }
 
-    /// Notes the scene's own camera, in the parts that keys have changed. Parts that were noted before stay as they are.
+    /// Records the original values of the camera parts that were moved with keys. Values recorded earlier are
+    /// kept.
     pub(crate) fn note_moved_parts(&mut self) {
         let Some(own) = self.camera else { return };
         let (moved, from) = (&self.toggles.camera, self.moved_from);
@@ -273,13 +277,14 @@ impl RequestState {
         };
     }
 
-    /// Takes the scene's own camera for the one that keys have moved.
+    /// Makes the scene's current camera the origin of the movement.
     pub(crate) fn move_from_own(&mut self) {
         self.moved_from = CameraChange::default();
         self.note_moved_parts();
     }
 
-    /// Keys of the camera that were saved since keys moved them, with the values that the scene has now.
+    /// Camera keys that were saved after the camera was moved with keys, with their current values in the
+    /// scene.
     pub(crate) fn saved_since_moved(&self) -> Vec<String> {
         let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
         let from = &self.moved_from;
@@ -292,7 +297,7 @@ impl RequestState {
             let is_saved = before.is_some_and(|before| before != now) && now != moved;
             is_saved.then(|| format!("camera.{key} = {now}"))
         };
-        // A plane in focus that goes through `look_at` moves with the camera.
+        // A focal plane through `look_at` moves with the camera.
         let focus = from.focus.filter(|_| !own.is_focused_on_look_at());
         let all = [
             of_pose("position", |pose| pose.position),
@@ -304,7 +309,7 @@ impl RequestState {
         all.into_iter().flatten().collect()
     }
 
-    /// Changes by keys that the picture alone does not show, in words.
+    /// Changes made with keys that are not obvious from the image, in words.
     pub(crate) fn changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
@@ -314,12 +319,13 @@ impl RequestState {
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
-    /// Whether this is the scene's own image, the only one that is written without a key: keys change nothing of it.
+    /// Whether this is the scene's own image, without changes made with keys. Only this image is written
+    /// automatically.
     pub(crate) fn is_own(&self) -> bool {
         self.toggles == Toggles::default()
     }
 
-    /// The view that the run was started with.
+    /// The initial view.
     pub(crate) fn base_view(&self) -> View {
         self.command_line.view.unwrap_or(View::Beauty)
     }
@@ -328,37 +334,37 @@ impl RequestState {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
-    /// The shadows of the scene with the command line. `None` until a scene has been understood.
+    /// Shadows of the scene with command-line overrides. `None` until a valid scene has been read.
     pub(crate) fn base_shadows(&self) -> Option<Shadows> {
         self.command_line.shadows.or(self.own.map(|own| own.shadows))
     }
 
-    /// The shadows that hold now.
+    /// Current shadows.
     pub(crate) fn shadows(&self) -> Shadows {
         self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
     }
 
-    /// Whether the scene with the command line has photons. `None` until a scene has been understood.
+    /// Photons of the scene with command-line overrides. `None` until a valid scene has been read.
     pub(crate) fn base_photons(&self) -> Option<bool> {
         self.command_line.photons.or(self.own.map(|own| own.photons))
     }
 
-    /// Whether photons are on now.
+    /// Whether photons are currently on.
     pub(crate) fn photons(&self) -> bool {
         self.toggles.photons.or(self.base_photons()).unwrap_or(false)
     }
 
-    /// The integrator of the scene with the command line. `None` until a scene has been understood.
+    /// Integrator of the scene with command-line overrides. `None` until a valid scene has been read.
     pub(crate) fn base_integrator(&self) -> Option<Integrator> {
         self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }
 
-    /// The integrator that holds now.
+    /// Current integrator.
     pub(crate) fn integrator(&self) -> Integrator {
         self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
     }
 
-    /// Aspect ratio of the image; a usual one until it is known.
+    /// Aspect ratio of the image; a typical one until it is known.
     pub(crate) fn aspect(&self) -> f32 {
         const USUAL: f32 = 4.0 / 3.0;
         self.effective
@@ -373,7 +379,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exposure_has_the_minus_of_all_numbers() {
+    fn exposure_uses_a_minus_sign() {
         assert_eq!([-0.25, 0.0, 1.5].map(signed_stops), ["−0.25", "0", "+1.5"]);
     }
 }

@@ -1,4 +1,4 @@
-//! Saves: of the scene's files by a person, of images and of the camera by glimt.
+//! Saves of scene files by the user, and of images and cameras by glimt.
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -8,14 +8,14 @@ use crate::event::WriteFailure;
 use crate::options::Lost;
 use crate::pipeline::protocol::{CameraEdit, OwnState, Viewpoint};
 
-/// A save on its way to the screen.
+/// A save that is not on the screen yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PendingChange {
     pub generation: u64,
     pub noticed: Instant,
 }
 
-/// The scene's own image: that of the scene file as saved, with the options of the command line.
+/// The scene's own image: the saved scene with command-line overrides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct OwnImage {
     pub state: OwnState,
@@ -23,60 +23,60 @@ pub(crate) struct OwnImage {
     pub fraction: f64,
 }
 
-/// A picture that was written.
+/// A written image file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WrittenFile {
     pub path: PathBuf,
     pub bytes: u64,
-    /// Number of the request.
+    /// Generation of the request.
     pub generation: u64,
-    /// Description of the file, in words, as far as it is known.
+    /// Description of the file, if known.
     pub made: String,
-    /// Changes by keys that it shows. `None` for the scene's own image.
+    /// Changes made with keys that it shows. `None` for the scene's own image.
     pub shows: Option<Toggles>,
-    /// Whether a later picture could not be written there: nobody knows what the file holds.
+    /// Whether a later image could not be written there, so the content is unknown.
     pub is_stale: bool,
     /// Change of the file by another program.
     pub lost: Option<Lost>,
 }
 
-/// Saves of the scene's files, and files that were written.
+/// Saves of scene files, and written images.
 pub(crate) struct SavingState {
-    /// Changes of the scene's files so far.
+    /// Number of changes of the scene's files.
     pub edits: u64,
     /// Request of the last edit.
     pub last_edit: Option<u64>,
-    /// The first request with the files as they were saved last.
+    /// First request with the last saved files.
     pub saved_at: u64,
     pub own: OwnImage,
-    /// Whether nobody is writing the scene's files.
+    /// Whether no program is writing the scene's files.
     pub is_settled: bool,
-    /// The last save, until the first cell that it changes is shown.
+    /// The last save, until its first changed cell is on the screen.
     pub change: Option<PendingChange>,
-    /// Time at which the editor last gave the terminal back.
+    /// Time at which the editor last exited.
     pub editor_closed: Option<Instant>,
-    /// Time from the last save to its first changed cell, without the time in the editor.
+    /// Time from the last save to its first changed cell, without the time spent in the editor.
     pub first_change: Option<Duration>,
     /// Time at which glimt wrote the camera into the scene file.
     pub camera_kept: Option<Instant>,
-    /// Whether an older picture was shown when a key last asked for that.
+    /// Whether an older render was shown when the camera was last kept.
     pub is_camera_of_newest: bool,
-    /// Cameras that glimt wrote into the scene file and can take back, the last one at the end.
+    /// Cameras written into the scene file that can be undone, newest last.
     pub camera_edits: Vec<CameraEdit>,
-    /// Whether there is a scene beside the model that is shown: `c` does not write over it.
+    /// Whether a scene file exists next to the model. `c` does not overwrite it.
     pub has_scene_of_model: bool,
-    /// Camera of the scene that `c` wrote beside the model.
+    /// Camera of the scene that `c` wrote for the model.
     pub camera_of_model: Option<Viewpoint>,
     /// Time at which glimt refused to write the camera into the scene file.
     pub camera_refused: Option<Instant>,
 
-    /// Whether a key asked for the next image that is written.
+    /// Whether a key requested the next written image.
     pub is_write_requested: bool,
-    /// Changes by keys that were shown when a key last asked for that.
+    /// Changes made with keys when a write was last requested.
     pub write_shows: Toggles,
-    /// Why the current picture is not on disk, if it should be.
+    /// Why the current image is not on disk, if it should be.
     pub unwritten: Option<String>,
-    /// The last failure to write, until a later picture is on disk.
+    /// The last write failure, until a later image is on disk.
     pub write_failed: Option<WriteFailure>,
     pub written: Vec<WrittenFile>,
 }

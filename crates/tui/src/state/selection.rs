@@ -1,21 +1,21 @@
-//! The mouse, and the place of the picture that is picked.
+//! The mouse, the crosshair, and the inspected object.
 
 use crate::event::FilePosition;
 use crate::pipeline::protocol::Spot;
 
-/// A press of the left button on the picture.
+/// A press of the left button on the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Press {
-    /// Column of the mouse when it last moved.
+    /// Last column of the mouse.
     pub column: u16,
-    /// Row of the mouse when it last moved.
+    /// Last row of the mouse.
     pub row: u16,
     pub has_moved: bool,
-    /// Place of the picture at which the press began.
+    /// Position in the image at which the press started.
     pub from: Option<Spot>,
 }
 
-/// Purpose of a question about a place of the picture.
+/// Purpose of a pick query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum PickPurpose {
     #[default]
@@ -23,23 +23,23 @@ pub(crate) enum PickPurpose {
     Focus,
 }
 
-/// The mouse, the crosshair, and the object there.
+/// The mouse, the crosshair, and the inspected object.
 pub(crate) struct SelectionState {
     pub is_mouse_on: bool,
     pub press: Option<Press>,
     /// Whether the next click sets the focus.
     pub is_focusing: bool,
-    /// Whether the next drag marks the section to render first.
+    /// Whether the next drag selects the region to render first.
     pub is_marking: bool,
-    /// Place of the last click, else the middle of the picture.
+    /// Position of the last click; initially the center of the image.
     pub crosshair: Spot,
-    /// Purpose of the last question about a place.
+    /// Purpose of the last pick query.
     pub purpose: PickPurpose,
-    /// Facts about the picked object, until the next key.
+    /// Facts about the inspected object, until the next key.
     pub facts: Option<Vec<String>>,
-    /// Text of the last click, in one line.
+    /// Inspected values of the last click, in one line.
     pub clicked: Option<String>,
-    /// Place of the picked object in the scene file.
+    /// Position of the inspected object in the scene file.
     pub picked: Option<FilePosition>,
 }
 

@@ -1,4 +1,4 @@
-//! The worker's progress on the newest request.
+//! Progress of the worker on the newest request.
 
 use std::time::{Duration, Instant};
 
@@ -6,14 +6,14 @@ use super::request::ImageOrigin;
 use crate::noise_curve::NoiseCurve;
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
 
-/// Activity of the worker for the current generation.
+/// What the worker does for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activity {
-    /// At work since then.
+    /// Working.
     Running { since: Instant },
     /// Finished.
     Done,
-    /// Failed, perhaps because the file is not whole yet.
+    /// Failed, but the file may still be incomplete.
     Waiting,
     /// Failed.
     Broken,
@@ -21,7 +21,8 @@ pub(crate) enum Activity {
     Cancelled,
 }
 
-/// Render of the newest request's picture. While the scene is broken, that is a picture of the last good one.
+/// State of the render of the newest request. While the scene is broken, that is a render of the last valid
+/// scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Rendering {
     UnderWay,
@@ -29,11 +30,11 @@ pub(crate) enum Rendering {
     Stopped,
 }
 
-/// The bar of a loading asset.
+/// Progress bar of a loading asset.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct AssetBar {
     pub progress: AssetProgress,
-    /// Time at which the bar was full; the bar stays a moment longer, so that 100% is seen.
+    /// Time at which the bar was full. It stays for a moment so that 100% is visible.
     pub finished: Option<Instant>,
 }
 
@@ -54,20 +55,20 @@ pub(crate) struct WorkState {
     /// Time at which the request was paused.
     pub paused_at: Option<Instant>,
     pub stages: [Option<StageReport>; Stage::ALL.len()],
-    /// Seconds of each stage when it last worked before this request.
+    /// Duration of each stage when it last ran before this request.
     pub last_seconds: [Option<f64>; Stage::ALL.len()],
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
-    /// Noise against the time of this render.
+    /// Noise over time of this render.
     pub curve: NoiseCurve,
-    /// The same of the last picture that was finished.
+    /// Noise over time of the last finished render.
     pub last_curve: NoiseCurve,
-    /// Curves of the last renders, the newest at the end: a picture that is found again has its curve.
+    /// Curves of the last renders, newest last, for images that are found again.
     curves: Vec<(ImageOrigin, NoiseCurve)>,
     /// Whether the request changed nothing.
     pub unchanged: bool,
-    /// Finished renders so far; another exposure is no render.
+    /// Number of finished renders; changes of exposure do not count.
     pub renders: u64,
 }
 
@@ -91,7 +92,7 @@ impl WorkState {
         }
     }
 
-    /// Keeps the curve of a finished render.
+    /// Stores the curve of a finished render.
     pub(crate) fn keep_curve(&mut self, origin: ImageOrigin) {
         const MOST: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
@@ -101,13 +102,13 @@ impl WorkState {
         }
     }
 
-    /// Takes up the curve of a picture that is found again, if it is known.
+    /// Restores the curve of an image that is found again, if it is known.
     pub(crate) fn find_curve(&mut self, origin: &ImageOrigin) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }
 
-    /// Whether a picture is being rendered, be it of the last good scene.
+    /// Whether a render is running, possibly of the last valid scene.
     pub(crate) fn is_under_way(&self) -> bool {
         self.rendering == Rendering::UnderWay
     }
@@ -116,7 +117,7 @@ impl WorkState {
         matches!(self.activity, Activity::Running { .. })
     }
 
-    /// Time that the current request has been at work; it stands still during a pause.
+    /// Time that the current request has been running, without pauses.
     pub(crate) fn running_for(&self, now: Instant) -> Option<Duration> {
         match self.activity {
             Activity::Running { since } => {
@@ -126,14 +127,14 @@ impl WorkState {
         }
     }
 
-    /// The same, with the seconds in which earlier requests rendered the samples that it goes on from.
+    /// Like [`WorkState::running_for`], plus the time in which earlier requests rendered its samples.
     pub(crate) fn rendering_for(&self, now: Instant) -> Option<Duration> {
         let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
         let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();
         self.running_for(now).map(|time| time.saturating_add(earlier))
     }
 
-    /// Stops the clock of the request, or lets it go on.
+    /// Pauses or resumes the clock of the request.
     pub(crate) fn set_paused(&mut self, paused: bool, now: Instant) {
         self.paused = paused;
         if paused {

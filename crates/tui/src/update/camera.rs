@@ -1,5 +1,5 @@
-//! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture,
-//! and glimt renders only the newest step that waits.
+//! Camera keys and mouse gestures. Steps arrive faster than previews, so a step waits until the previous one
+//! has its first preview, and only the newest waiting step is rendered.
 
 use std::path::PathBuf;
 
@@ -7,6 +7,7 @@ use super::request::render;
 use super::say::{notify, prompt, say};
 use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
+use crate::messages;
 use crate::pipeline::protocol::{Command, Kept, MovedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
@@ -14,65 +15,65 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{State, signed_stops};
 
-/// Degrees of a step around.
+/// Degrees per orbit step.
 const TURN: f64 = 3.0;
-/// Factor of the eye's distance for a step nearer.
+/// Factor of the distance per dolly step.
 const NEARER: f64 = 0.95;
-/// Factor of the field of view for a step wider.
+/// Factor of the field of view per zoom step.
 const WIDER: f64 = 1.05;
-/// Greatest difference from the first field of view that counts as none, since each step is rounded; every step is larger.
+/// Maximum deviation from the original field of view that counts as equal, since every step is rounded. Steps
+/// are larger.
 const ROUNDING: f64 = 0.015;
-/// Stops of a step of exposure.
+/// Stops per exposure step.
 const STOPS: f32 = 0.25;
-/// The most that keys expose, and darken.
+/// Exposure limit in stops, in both directions.
 const MOST_STOPS: f32 = 20.0;
 
-/// Turns by so many steps to the right and up.
+/// Orbits by a number of steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     turn(state, right * TURN, up * TURN)
 }
 
-/// Turns by so many degrees to the right and up.
+/// Orbits by an angle in degrees to the right and up.
 pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
     moved(state, |pose| orbited(pose, right, up))
 }
 
-/// Moves so many steps nearer.
+/// Moves closer by a number of steps.
 pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some((view, own)) = state.request.viewpoint().zip(state.request.camera) else {
         return unknown(state);
     };
     let pose = dollied(&view.pose, libm::pow(NEARER, steps), own.pose.distance());
     if pose == view.pose {
-        let (end, part) = if steps > 0.0 { ("near", "a thousandth of") } else { ("far", "1000 times") };
-        return notify(state, &format!("this is as {end} as keys go: {part} the scene's own distance"));
+        return notify(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
     }
     moved(state, |_| pose)
 }
 
-/// Widens the field of view by so many steps.
+/// Widens the field of view by a number of steps.
 pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     let fov = zoomed(&view, libm::pow(WIDER, steps));
     if fov == view.fov {
-        return notify(state, &format!("field of view {fov}°: keys go from 1° to 160°"));
+        return notify(state, &messages::field_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
     step_of_camera(state)
 }
 
-/// Brightens by so many steps.
+/// Raises the exposure by a number of steps.
 pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(scene) = state.request.exposure else { return unknown(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
     if stops == before {
-        return notify(state, &format!("exposure {}: keys go from −20 to +20", signed_stops(stops)));
+        return notify(state, &messages::exposure_limit(&signed_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
-    say(state, format!("exposure {}", signed_stops(stops)));
+    say(state, messages::exposure(&signed_stops(stops)));
     effects
 }
 
@@ -83,7 +84,7 @@ fn moved(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
 }
 
 fn unknown(state: &mut State) -> Vec<Effect> {
-    notify(state, "the scene has not been read yet")
+    notify(state, messages::NO_SCENE)
 }
 
 pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
@@ -91,16 +92,12 @@ pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
     let effects = step(state);
     say(
         state,
-        if state.request.toggles.camera.is_any() {
-            "camera moved (preview only). w: save image · c: keep in scene · 0: reset"
-        } else {
-            "the camera is where the scene has it"
-        },
+        if state.request.toggles.camera.is_any() { messages::CAMERA_MOVED } else { messages::CAMERA_RESET },
     );
     effects
 }
 
-/// Drops changes back to the scene's own values.
+/// Drops changes that restore the scene's own values.
 fn forget_own(state: &mut State) {
     let Some(own) = state.request.camera else { return };
     let camera = &mut state.request.toggles.camera;
@@ -110,30 +107,29 @@ fn forget_own(state: &mut State) {
     camera.focus = camera.focus.filter(|focus| *focus != own.changed(&pose).focus);
 }
 
-/// The camera as it is now is to be put into the scene file.
+/// Requests that the current camera is written into the scene file.
 pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera) else {
         return unknown(state);
     };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
-    // The scene of a model is worth writing with its own camera, too.
+    // For a model, `c` writes a scene even with the default camera.
     if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
-        return notify(state, "camera unchanged: nothing to keep");
+        return notify(state, messages::NOTHING_TO_KEEP);
     }
     let saved = state.request.saved_since_moved();
-    // A model has no file in which a camera is saved.
+    // Models do not contain a saved camera.
     if !saved.is_empty() && !is_mesh(&state.request.scene) {
-        // The person knows of it from here on.
+        // From here on the user knows about the save.
         state.request.move_from_own();
         let saved = saved.join(", ");
-        let why = "was saved since the keys moved the camera: press c again to write over it";
-        return prompt(state, &format!("error: {saved} {why}"));
+        return prompt(state, &format!("error: {saved} {}", messages::CAMERA_CONFLICT));
     }
     state.saving.is_camera_of_newest = state.picture.history.is_open();
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
-/// Tells the outcome of keeping the camera. A camera that the file has now does not count as moved by keys.
+/// Handles the outcome of keeping the camera. A camera that is now in the file no longer counts as moved.
 pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
     let Kept { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,
@@ -147,17 +143,13 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
     }
     let name = visible(&path.to_string_lossy()).into_owned();
-    let which = if state.saving.is_camera_of_newest {
-        ": that of the newest picture, not of the one that was shown"
-    } else {
-        ""
-    };
     let words = match (is_new, is_own) {
-        _ if of_model => format!("wrote {name}, a scene of this model with this camera{which}"),
-        (true, true) => format!("camera saved to {name}{which} · u: undo"),
-        (true, false) => format!("the camera is in {name}{which}; in this call --set comes first"),
-        (false, _) => format!("{name} has this camera already{which}"),
+        _ if of_model => messages::model_scene(&name),
+        (true, true) => messages::camera_saved(&name),
+        (true, false) => messages::camera_overridden(&name),
+        (false, _) => messages::camera_known(&name),
     };
+    let which = if state.saving.is_camera_of_newest { messages::OF_NEWEST_RENDER } else { "" };
     state.saving.camera_edits.extend(edit);
     let mut effects = Vec::new();
     if let Some(since) = state.request.moved_since.filter(|_| is_new) {
@@ -168,22 +160,20 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         effects = render(state, false);
     }
     state.saving.camera_kept = is_new.then_some(state.now);
-    say(state, words);
+    say(state, words + which);
     effects
 }
 
-/// The last camera that was written into the scene file is to be taken back.
+/// Requests that the last camera written into the scene file is undone.
 pub(super) fn undo(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
-        None if state.saving.camera_of_model.is_some() => {
-            notify(state, "the scene that c wrote beside the model stays: there is nothing in it to undo")
-        }
-        None => notify(state, "nothing to undo"),
+        None if state.saving.camera_of_model.is_some() => notify(state, messages::NEW_SCENE_STAYS),
+        None => notify(state, messages::NOTHING_TO_UNDO),
     }
 }
 
-/// Tells the outcome of that. The picture is that of the file again.
+/// Handles the outcome of undoing a kept camera.
 pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
     let path = match outcome {
         Ok(path) => path,
@@ -197,11 +187,11 @@ pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec
     let effects = render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = visible(&path.to_string_lossy()).into_owned();
-    say(state, format!("undone: {name} restored"));
+    say(state, messages::undone(&name));
     effects
 }
 
-/// The newest step, now or as soon as the one before has a picture.
+/// Renders the newest step now, or once the previous one has a preview.
 fn step(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.awaits_step() {
@@ -213,7 +203,7 @@ fn step(state: &mut State) -> Vec<Effect> {
     effects
 }
 
-/// The step that waits, if its turn has come.
+/// Renders a waiting step if the previous one has a preview.
 pub(super) fn keep_up(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
 }

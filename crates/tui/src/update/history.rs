@@ -1,14 +1,13 @@
-//! Pictures of before: the last ones, older and newer, and the one from before the last edit.
+//! The history: older and newer renders, and the one before the last edit.
 
 use std::sync::Arc;
 
 use super::say::{notify, say, say_until_key};
 use crate::event::Effect;
+use crate::messages;
 use crate::state::{Rendering, State};
 
-const NEWEST: &str = "this is the newest picture";
-
-/// The picture that stands goes to those of before.
+/// Moves the current image into the history.
 pub(super) fn record(state: &mut State) {
     if let Some(shown) = newest(state).filter(|shown| shown.generation == state.request.generation) {
         let is_finished = state.work.rendering == Rendering::Finished || shown.is_finished();
@@ -17,8 +16,8 @@ pub(super) fn record(state: &mut State) {
     }
 }
 
-/// Records a picture of the newest request that was shown, or that waits behind an older one. The last one often comes after the
-/// end of its render. Pixels 1:1 of a finished picture do not take its place.
+/// Records a new image of the newest request, even while an older one is shown. The last one often arrives
+/// after its render has ended. A 1:1 section never replaces a finished image.
 pub(super) fn record_newest(state: &mut State) {
     let is_over = !state.work.is_under_way();
     if is_over && newest(state).is_some_and(|shown| shown.section.is_some()) {
@@ -32,25 +31,25 @@ pub(super) fn record_newest(state: &mut State) {
     state.dirty |= is_new || is_over && is_other;
 }
 
-/// Goes so many pictures back; negative: forward.
+/// Moves back by `steps` renders, or forward if negative.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);
-    let Some(newest) = newest(state) else { return notify(state, "there is no picture yet") };
+    let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
     if state.picture.history.leads_to_newest(steps) {
-        return close(state, NEWEST);
+        return close(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.step(steps, newest) {
         Some(shown) => look_at(state, shown),
-        None => notify(state, if steps > 0 { "this is the oldest picture that is kept" } else { NEWEST }),
+        None => notify(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER }),
     }
 }
 
-/// One of the pictures of the strip.
+/// Opens a render of the history strip.
 pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
     record(state);
     let Some(newest) = newest(state) else { return Vec::new() };
     if at + 1 >= state.picture.history.len() {
-        return close(state, NEWEST);
+        return close(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.open_at(at, newest) {
         Some(shown) => look_at(state, shown),
@@ -58,26 +57,26 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
     }
 }
 
-/// The picture from before the last edit, or the newest again.
+/// Shows the render before the last edit, or the newest one again.
 pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_open() {
-        return close(state, "after the last edit: the newest picture");
+        return close(state, messages::AFTER_EDIT);
     }
     record(state);
-    let Some(newest) = newest(state) else { return notify(state, "there is no picture yet") };
+    let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
     match state.picture.history.before_edit(newest) {
         Some(shown) => {
             let effects = look_at(state, shown);
             let edits = state.picture.history.edits_since_open();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
-            say_until_key(state, format!("before the last edit{edits}"));
+            say_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
-        None => notify(state, "there is no picture from before an edit"),
+        None => notify(state, messages::NO_EARLIER_RENDER),
     }
 }
 
-/// Back to the newest picture.
+/// Returns to the newest render.
 pub(super) fn close(state: &mut State, words: &str) -> Vec<Effect> {
     if let Some(newest) = state.picture.history.close() {
         state.picture.shown = Some(newest);
@@ -92,9 +91,9 @@ fn newest(state: &State) -> Option<crate::history::ShownImage> {
 
 fn look_at(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
-    // The first line says which one it is, and how old, which goes on.
-    let older = if state.picture.history.is_oldest_open() { "" } else { "n older · " };
-    let words = format!("{} · {older}N newer", state.picture.history.reason_of_open());
+    // The header shows which render it is and how old.
+    let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_open())..];
+    let words = [&[&*state.picture.history.reason_of_open()], keys].concat().join(" · ");
     say_until_key(state, words);
     Vec::new()
 }

@@ -1,4 +1,4 @@
-//! Effects of keys on the state.
+//! Handles keys.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
@@ -11,6 +11,7 @@ use crate::action::Action;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap;
+use crate::messages;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
 use crate::preview_kind::PreviewKind;
@@ -25,11 +26,7 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     let Some(action) = keymap::action(key) else {
         let is_digit = key == KeyPress { code: key.code, modifiers: KeyModifiers::NONE }
             && matches!(key.code, KeyCode::Char('1'..='9'));
-        return if is_digit {
-            notify(state, "v lists the views; a digit chooses one of the list")
-        } else {
-            Vec::new()
-        };
+        return if is_digit { notify(state, messages::VIEWS_FIRST) } else { Vec::new() };
     };
     state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
     state.selection.is_focusing &= action == Action::Focus;
@@ -68,9 +65,7 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::CloseUp => close_up(state),
         Action::RectangleFirst => rectangle::press(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
-        Action::Edit if is_mesh(&state.request.scene) => {
-            notify(state, "the editor opens scenes, and this is a model; c writes a scene of it")
-        }
+        Action::Edit if is_mesh(&state.request.scene) => notify(state, messages::NO_EDITOR_FOR_MODELS),
         Action::Edit => vec![Effect::Edit(places::to_edit(state))],
         Action::BeforeAfter => history::before_and_after(state),
         Action::OlderPicture => history::browse(state, 1),
@@ -107,19 +102,17 @@ fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     render(state, false)
 }
 
-/// Message that the integrator does not honour a setting, with another one that does. `None` if it honours the setting.
-fn refused(state: &State, honours: impl Fn(Method) -> bool, what: &str) -> Option<String> {
-    let own = state.request.integrator();
-    if honours(own.method()) {
+/// Name of an integrator that supports a setting. `None` if the current one does.
+fn other_integrator(state: &State, supports: impl Fn(Method) -> bool) -> Option<&'static str> {
+    if supports(state.request.integrator().method()) {
         return None;
     }
-    let other = Integrator::ALL.iter().find(|one| honours(one.method()))?;
-    Some(format!("{} {what}; press i for {}", own.name(), other.name()))
+    Integrator::ALL.iter().find(|one| supports(one.method())).map(|one| one.name())
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    if let Some(refused) = refused(state, |method| method.honours_shadows, "ignores `shadows`") {
-        return notify(state, &refused);
+    if let Some(other) = other_integrator(state, |method| method.honours_shadows) {
+        return notify(state, &messages::soft_shadows(state.request.integrator().name(), other));
     }
     let next = match state.request.shadows() {
         Shadows::Soft => Shadows::Hard,
@@ -130,25 +123,25 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
     render(state, false)
 }
 
-/// A scene whose depth of field is off although nothing switched it off has a pinhole for a lens.
+/// If the lens is open and nothing turned depth of field off, the camera is a pinhole.
 fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     let switched_off = state.request.overrides().dof == Some(false);
     match &state.request.effective {
-        None => return notify(state, "the scene has not been read yet"),
+        None => return notify(state, messages::NO_SCENE),
         Some(effective) if !effective.dof && !switched_off => {
-            return notify(state, "no depth of field: the camera's `aperture` is 0");
+            return notify(state, messages::PINHOLE);
         }
         Some(_) => {}
     }
-    // Where nothing switches it off, the lens decides.
+    // Unless it is turned off, the lens decides.
     let base = state.request.command_line.dof.or(Some(true));
     state.request.toggles.dof = Some(switched_off).filter(|next| is_change(next, base));
     render(state, false)
 }
 
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
-    if let Some(refused) = refused(state, |method| method.gathers, "gathers no photons") {
-        return notify(state, &refused);
+    if let Some(other) = other_integrator(state, |method| method.gathers) {
+        return notify(state, &messages::no_photons(other));
     }
     let next = !state.request.photons();
     state.request.toggles.photons = Some(next).filter(|next| is_change(next, state.request.base_photons()));
@@ -162,7 +155,7 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
 
 fn picture_alone(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
-        PreviewKind::None => return notify(state, "no picture is shown: see --preview"),
+        PreviewKind::None => return notify(state, messages::NO_PREVIEW),
         PreviewKind::HalfBlock
         | PreviewKind::Quadrant
         | PreviewKind::Sextant
@@ -175,16 +168,16 @@ fn picture_alone(state: &mut State) -> Vec<Effect> {
     resized_preview(state)
 }
 
-/// The picture's own pixels around the crosshair, or all of it again.
+/// Shows actual pixels around the crosshair, or the whole image again.
 fn close_up(state: &mut State) -> Vec<Effect> {
     if state.request.preview_size.is_none() {
-        return notify(state, "no picture is shown: see --preview");
+        return notify(state, messages::NO_PREVIEW);
     }
     history::close(state, "");
     state.picture.close_up =
         if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
     match state.picture.close_up {
-        Some(_) => say(state, "1:1: the picture's own pixels around the crosshair; x goes back"),
+        Some(_) => say(state, messages::ACTUAL_PIXELS),
         None => state.overlays.message = None,
     }
     state.dirty = true;
@@ -193,7 +186,7 @@ fn close_up(state: &mut State) -> Vec<Effect> {
 
 fn toggle_pause(state: &mut State) -> Vec<Effect> {
     if !state.work.is_running() && !state.work.paused {
-        return notify(state, "nothing is rendering");
+        return notify(state, messages::NOT_RENDERING);
     }
     state.set_paused(!state.work.paused);
     state.dirty = true;
@@ -202,35 +195,25 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
 
 fn write_now(state: &mut State) -> Vec<Effect> {
     let is_open = state.picture.history.is_open();
-    say(
-        state,
-        if is_open {
-            "writing the newest image, not the one that is shown"
-        } else {
-            "writing the image as it is now"
-        },
-    );
+    say(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
     (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
     vec![Effect::Send(Command::Write)]
 }
 
 fn scene_settings(state: &mut State) -> Vec<Effect> {
     if state.request.toggles == Toggles::default() {
-        return notify(state, "nothing to reset");
+        return notify(state, messages::NOTHING_TO_RESET);
     }
     state.request.toggles = Toggles::default();
     let effects = render(state, false);
-    say(state, "reset to the scene's settings");
+    say(state, messages::RESET);
     effects
 }
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
     if state.overlays.problems.is_none() && state.reported().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
-        return notify(
-            state,
-            if is_read { "no errors and no warnings" } else { "the files are still being read" },
-        );
+        return notify(state, if is_read { messages::NO_DIAGNOSTICS } else { messages::STILL_READING });
     }
     change(state, |state| {
         state.overlays.diagnostics.open = !state.overlays.diagnostics.open;

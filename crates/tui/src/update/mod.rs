@@ -1,4 +1,4 @@
-//! State and event in, effects out. Nothing here touches the world.
+//! The update function: state and event in, effects out. It has no side effects.
 
 mod camera;
 mod history;
@@ -21,6 +21,7 @@ use self::say::say_until_key;
 use super::ExitStatus;
 use super::event::{Effect, Event, EventSource, Signal, Window};
 use super::history::ShownImage;
+use super::messages;
 use super::options::Changed;
 use super::preview_kind::PreviewKind;
 use super::state::{Message, OwnImage, PendingChange, State};
@@ -28,15 +29,15 @@ use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{Command, OwnState};
 
-/// Time that the window must keep its size before glimt requests another preview.
+/// Time that the window size must be stable before a new preview is requested.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
 
-/// The first request.
+/// Creates the first request.
 pub(super) fn start(state: &mut State) -> Vec<Effect> {
     render(state, false)
 }
 
-/// One event.
+/// Handles an event and returns its effects.
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
     let was_paused = state.work.paused;
@@ -46,7 +47,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     if was_paused && effects.iter().any(is_request) {
         let message = state.overlays.message.take();
         let rest = message.map_or(String::new(), |message| format!(" · {}", message.words));
-        say(state, format!("no longer paused{rest}"));
+        say(state, format!("{}{rest}", messages::RESUMED));
     }
     effects
 }
@@ -55,7 +56,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::update(state, key),
         Event::Mouse(mouse) => pointer::update(state, mouse),
-        // There is nothing to type text into; the loop tells the line what that has to know.
+        // Pasted text has no meaning. The event loop handles the others.
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
         Event::TerminalReply(answer) => replies::learn(state, answer),
         Event::Frame(report) => {
@@ -69,7 +70,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             show(state, ShownImage { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
-            // It may be glimt's own save, or one that kept glimt from its own: the message about that stays.
+            // The change may come from glimt itself, or may have prevented glimt's own. Keep that message.
             const OWN: Duration = Duration::from_secs(1);
             let is_of = |said: Option<Instant>| said.is_some_and(|said| state.now <= said + OWN);
             let (is_own, is_known) = (is_of(state.saving.camera_kept), is_of(state.saving.camera_refused));
@@ -87,7 +88,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             state.saving.saved_at = state.request.generation;
             state.saving.own = OwnImage { state: OwnState::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
-            // A save out of the editor is seen when that has ended at the earliest.
+            // A save made in the editor can be seen only after the editor has exited.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
             state.saving.change = Some(PendingChange { generation: state.request.generation, noticed });
             effects
@@ -99,7 +100,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Output(change) => worker::output_changed(state, &change),
         Event::Signal(signal) => vec![signalled(signal)],
         Event::Shown { generation } => {
-            // The picture does not wait for its entry in the strip.
+            // Show the preview first, then update the history.
             history::record_newest(state);
             shown(state, generation)
         }
@@ -114,7 +115,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             Vec::new()
         }
         Event::NoShell => {
-            say(state, "there is no shell to go back to");
+            say(state, messages::NO_SHELL);
             Vec::new()
         }
     }
@@ -141,8 +142,8 @@ fn show(state: &mut State, shown: ShownImage) -> Vec<Effect> {
     Vec::new()
 }
 
-/// A picture whose pixels keep the colors of the one before it that they hardly differ from. Where colors are mixed from a
-/// few others, one code more is quite another mixture.
+/// Keeps the colors of pixels that differ from the last preview by at most one code. With dithering, such a
+/// difference could change the pattern.
 fn steadied(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
     const HARDLY: u8 = 1;
     let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);
@@ -217,7 +218,7 @@ fn lost(state: &mut State, source: EventSource) -> Vec<Effect> {
         EventSource::Worker => vec![Effect::GiveUp],
         EventSource::Watcher => {
             worker::settled(state);
-            say_until_key(state, "files are no longer watched: r renders again");
+            say_until_key(state, messages::NOT_WATCHING);
             Vec::new()
         }
         EventSource::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],

@@ -1,4 +1,4 @@
-//! Effects of keys on overlays: the help, the list of views, the errors.
+//! Keys of the overlays: help, list of views, diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -6,12 +6,13 @@ use super::views::{self, choose_view};
 use super::{history, rectangle};
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
-use crate::keymap::{self, Overlay};
+use crate::keymap::{self, OverlayAction};
+use crate::messages;
 use crate::pipeline::settings::View;
 use crate::state::State;
 use crate::view::{diagnostics, help};
 
-/// None: nothing is open that the key means something to.
+/// Handles a key. `None` if no open overlay uses it.
 pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     if let Some(effects) = views::typed(state, key) {
         return Some(effects);
@@ -27,28 +28,31 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     act(state, action).then(Vec::new)
 }
 
-/// Whether there is anything open that this means something to.
-pub(super) fn act(state: &mut State, action: Overlay) -> bool {
+/// Whether an open overlay uses the action.
+pub(super) fn act(state: &mut State, action: OverlayAction) -> bool {
     match action {
-        Overlay::Close => close(state),
-        Overlay::LineUp => scroll(state, |line, _| line.saturating_sub(1)),
-        Overlay::LineDown => scroll(state, |line, _| line + 1),
-        Overlay::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
-        Overlay::PageDown => scroll(state, |line, page| line + page),
-        // They are for the list of views alone.
-        Overlay::ColumnLeft | Overlay::ColumnRight | Overlay::Take | Overlay::Find => false,
+        OverlayAction::Close => close(state),
+        OverlayAction::LineUp => scroll(state, |line, _| line.saturating_sub(1)),
+        OverlayAction::LineDown => scroll(state, |line, _| line + 1),
+        OverlayAction::PageUp => scroll(state, |line, page| line.saturating_sub(page)),
+        OverlayAction::PageDown => scroll(state, |line, page| line + page),
+        // Only the list of views uses these.
+        OverlayAction::ColumnLeft
+        | OverlayAction::ColumnRight
+        | OverlayAction::Take
+        | OverlayAction::Find => false,
     }
 }
 
-/// The view of a digit, while the list of them is open.
+/// The view of a digit while the list of views is open.
 fn chosen(state: &State, key: KeyPress) -> Option<View> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
     state.overlays.views.as_ref().filter(|_| key.modifiers.is_empty())?;
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()
 }
 
-/// Closes the topmost overlay: first those over all else, then waiting for a click or a drag, then facts about a place, then an
-/// older picture.
+/// Closes the topmost overlay: panes first, then waiting for a click or a drag, then the inspected values,
+/// then an older render.
 fn close(state: &mut State) -> bool {
     let is_open = if state.overlays.help.open {
         state.overlays.help.open = false;
@@ -65,7 +69,7 @@ fn close(state: &mut State) -> bool {
     } else if state.selection.facts.take().is_some() {
         true
     } else if state.picture.history.is_open() {
-        history::close(state, "the newest picture");
+        history::close(state, messages::NEWEST_RENDER);
         true
     } else {
         false
@@ -74,7 +78,7 @@ fn close(state: &mut State) -> bool {
     is_open
 }
 
-/// The help, or errors that are longer than their pane; in a shorter one the keys mean what they mean else.
+/// Scrolls the help or a pane of diagnostics that does not fit. Otherwise the keys keep their usual meaning.
 fn scroll(state: &mut State, step: impl FnOnce(usize, usize) -> usize) -> bool {
     let (is_help, (page, last)) = match () {
         () if state.overlays.help.open => (true, help::extent(state)),

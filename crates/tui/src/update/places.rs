@@ -1,10 +1,10 @@
-//! The place that the editor opens.
+//! The position that the editor opens.
 
 use crate::event::FilePosition;
 use crate::scene::diagnostic::{Diagnostic, Place};
 use crate::state::State;
 
-/// The first error, else what was clicked, else the first warning, else the scene.
+/// The first error, else the clicked object, else the first warning, else the scene.
 pub(super) fn to_edit(state: &State) -> FilePosition {
     let errors = state.overlays.problems.iter().flat_map(|problems| &problems.diagnostics).find_map(in_file);
     let warnings = || state.overlays.warnings.iter().find_map(in_file);
@@ -12,7 +12,7 @@ pub(super) fn to_edit(state: &State) -> FilePosition {
     errors.or_else(|| state.selection.picked.clone()).or_else(warnings).unwrap_or_else(scene)
 }
 
-/// The place of a diagnostic, if it is in a file.
+/// Position of a diagnostic, if it refers to a file.
 fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
     let Place { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;
@@ -20,7 +20,7 @@ fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
     let line = before.matches('\n').count() + 1;
     let column = before.get(start..)?.chars().count() + 1;
     let path = diagnostic.path.clone();
-    // What the call sets is in no file.
+    // Settings from the command line are not in a file.
     (!path.as_os_str().is_empty() && path.as_os_str() != "--set").then_some(FilePosition {
         path,
         line,

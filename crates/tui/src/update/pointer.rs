@@ -1,11 +1,12 @@
-//! The mouse on the picture, and questions about a place there.
+//! The mouse and queries about a position in the image.
 
 use super::say::{notify, prompt, say};
 use super::{camera, history, overlay, rectangle};
 use crate::event::FilePosition;
 use crate::event::{Effect, Mouse, MouseKind};
-use crate::keymap::Overlay;
+use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step, rounded};
+use crate::messages;
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
@@ -15,13 +16,10 @@ use crate::view::layout::Layout;
 use crate::view::preview::spot_at;
 use crate::window_title;
 
-/// Degrees that a drag over the width of the picture's area turns by.
+/// Degrees per drag across the width of the preview.
 const TURN_ACROSS: f64 = 180.0;
 
-const OLDER: &str = "of an older picture nothing is known but its pixels: b shows the newest one";
-const IN_FOCUS: &str = "everything is in focus: the camera's `aperture` is 0";
-
-/// Reacts to the mouse.
+/// Handles a mouse event.
 pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     match mouse.kind {
         MouseKind::Press => {
@@ -44,7 +42,11 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
             Some(_) | None => Vec::new(),
         },
         MouseKind::WheelUp | MouseKind::WheelDown if is_on_pane(state, mouse) => {
-            let line = if mouse.kind == MouseKind::WheelUp { Overlay::LineUp } else { Overlay::LineDown };
+            let line = if mouse.kind == MouseKind::WheelUp {
+                OverlayAction::LineUp
+            } else {
+                OverlayAction::LineDown
+            };
             overlay::act(state, line);
             Vec::new()
         }
@@ -58,7 +60,7 @@ fn is_on_pane(state: &State, mouse: Mouse) -> bool {
     state.overlays.help.open || state.overlays.diagnostics.open && is_on_errors()
 }
 
-/// The scene turns with the hand.
+/// Orbits the camera so that the scene follows the mouse.
 fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     let Some(press) = state.selection.press else { return Vec::new() };
     if state.selection.is_marking {
@@ -79,7 +81,7 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
 
 fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     if state.picture.history.is_open() {
-        return notify(state, OLDER);
+        return notify(state, messages::OLDER_RENDER);
     }
     let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
@@ -91,26 +93,23 @@ fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     ask(state, purpose)
 }
 
-/// Asks for the object at the crosshair.
+/// Queries the object at the crosshair.
 pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
     ask(state, PickPurpose::Inspect)
 }
 
-/// First it waits for a click; asked again it takes the crosshair.
+/// Waits for a click; pressed again, focuses at the crosshair.
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_open() {
-        return notify(state, OLDER);
+        return notify(state, messages::OLDER_RENDER);
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return notify(state, IN_FOCUS);
+        return notify(state, messages::PINHOLE);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return prompt(
-            state,
-            "click where to focus; f again focuses at the crosshair: the last click, else the middle",
-        );
+        return prompt(state, messages::CLICK_TO_FOCUS);
     }
     state.selection.is_focusing = false;
     ask(state, PickPurpose::Focus)
@@ -118,10 +117,10 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
 
 fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
     if state.picture.history.is_open() {
-        return notify(state, OLDER);
+        return notify(state, messages::OLDER_RENDER);
     }
     if state.request.camera.is_none() {
-        return notify(state, "the scene has not been read yet");
+        return notify(state, messages::NO_SCENE);
     }
     state.selection.purpose = purpose;
     vec![Effect::Send(Command::Pick(state.selection.crosshair))]
@@ -130,18 +129,14 @@ fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
 pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
     state.selection.is_mouse_on = !state.selection.is_mouse_on;
     (state.selection.press, state.selection.is_focusing, state.selection.is_marking) = (None, false, false);
-    let words = if state.selection.is_mouse_on {
-        "mouse on: drag turns, the wheel goes nearer, a click says what is there"
-    } else {
-        "mouse off: a drag selects text; m turns it on again"
-    };
+    let words = if state.selection.is_mouse_on { messages::MOUSE_ON } else { messages::MOUSE_OFF };
     say(state, words);
     vec![Effect::Mouse(state.selection.is_mouse_on)]
 }
 
-/// The answer.
+/// Handles the reply to a pick query.
 pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
-    // An older picture is looked at meanwhile.
+    // An older render has been opened in the meantime.
     if state.picture.history.is_open() {
         return Vec::new();
     }
@@ -157,7 +152,7 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
             state.dirty = true;
             Vec::new()
         }
-        (PickPurpose::Focus, None) => notify(state, "there is nothing to focus on"),
+        (PickPurpose::Focus, None) => notify(state, messages::NOTHING_TO_FOCUS),
         (PickPurpose::Focus, Some(thing)) => focus_at(state, thing.depth),
     }
 }
@@ -165,46 +160,43 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
 fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = rounded(depth, decimal_step(depth));
     if !(distance > 0.0) {
-        return notify(state, "there is nothing to focus on");
+        return notify(state, messages::NOTHING_TO_FOCUS);
     }
-    // The scene may have been edited since.
+    // The scene may have been edited in the meantime.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return notify(state, IN_FOCUS);
+        return notify(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::step_of_camera(state);
     if state.request.toggles.camera.focus.is_some() {
-        say(
-            state,
-            format!("focus at {distance} (preview only). w: save image · c: keep in scene · 0: reset"),
-        );
+        say(state, messages::focus_moved(distance));
     }
     effects
 }
 
-/// The same in one line, with the pixel.
+/// The inspected values in one line, with the pixel.
 fn clicked(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
 
-/// Copies what was clicked, if the terminal is known to take it.
+/// Copies the inspected values if the terminal supports it.
 pub(super) fn copy(state: &mut State) -> Vec<Effect> {
     if state.picture.history.is_open() {
-        return notify(state, OLDER);
+        return notify(state, messages::OLDER_RENDER);
     }
     let Some(clicked) = state.selection.clicked.clone() else {
-        return notify(state, "nothing was clicked yet: click, or press Enter, then y copies what is there");
+        return notify(state, messages::NOTHING_TO_COPY);
     };
     if !state.display.capabilities.clipboard {
-        // It stands there to be selected.
-        return notify(state, &format!("to copy, drag with shift (or after m): {clicked}"));
+        // The message shows the text so that it can be selected.
+        return notify(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
-    say(state, format!("copied: {clicked}"));
+    say(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::copy(&clicked))]
 }
 
-/// Shape and name, line, material, distance, place, color, normal.
+/// Shape and name, line, material, distance, position, radiance, normal.
 fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let light = color.map(|color| format!("radiance {}", numbers(color.map(f64::from))));
     let Some(thing) = thing else {
@@ -215,12 +207,12 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
     let mut facts = vec![format!("{shape}{name}")];
-    // The lines of a model's scene are in no file.
+    // The lines of a generated scene are not in a file.
     facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
     facts.extend([
         visible(material).into_owned(),
-        format!("{} away", number(*distance)),
-        format!("at {}", numbers(*position)),
+        format!("distance {}", number(*distance)),
+        format!("position {}", numbers(*position)),
     ]);
     facts.extend(light);
     facts.push(format!("normal {}{back}", numbers(normal.map(f64::from))));
@@ -231,7 +223,7 @@ fn numbers(all: [f64; 3]) -> String {
     format!("({})", all.map(number).join(", "))
 }
 
-/// Three digits, or all those before the point.
+/// Formats a number with three digits, or all digits before the point.
 fn number(number: f64) -> String {
     let digits = if number == 0.0 { 0.0 } else { 2.0 - libm::floor(libm::log10(number.abs())) };
     rounded(number, libm::pow(10.0, -digits.clamp(0.0, 3.0))).to_string()
@@ -242,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_there_is_said_in_a_few_words_each() {
+    fn inspected_values_are_short() {
         let thing = Thing {
             shape: "sphere",
             name: Some("ball".to_owned()),
@@ -262,15 +254,15 @@ mod tests {
                 "sphere \"ball\"",
                 "still.toml:47",
                 "glass crystal",
-                "3.82 away",
-                "at (0.214, 0.5, -33.1)",
+                "distance 3.82",
+                "position (0.214, 0.5, -33.1)",
                 "radiance (0.61, 1235, 0)",
                 "normal (0, 1, 0)"
             ]
         );
         let of_model = picked.thing.clone().map(|thing| Thing { path: "scenes/vase.obj".into(), ..thing });
         let of_model = facts(&Picked { thing: of_model, ..picked });
-        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "a model has no lines");
+        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models have no lines");
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
     }
 }

@@ -1,46 +1,45 @@
-//! A rectangle of the picture that is rendered before the rest.
+//! The region of the image that is rendered first.
 
 use super::request::render;
 use super::say::{prompt, say};
 use crate::event::Effect;
+use crate::messages;
 use crate::pipeline::protocol::{Section, Spot};
 use crate::state::State;
 
-/// Width and height of the one around a place.
+/// Width and height of a region around a position.
 const SIDE: f64 = 1.0 / 3.0;
 
-/// The key: first it waits for a drag; asked again it takes what is around the crosshair; then there is none any more.
+/// Handles the key: waits for a drag; pressed again, takes the region around the crosshair; pressed once
+/// more, clears it.
 pub(super) fn press(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
         let effects = again(state);
-        say(state, "no rectangle is rendered first any more");
+        say(state, messages::REGION_CLEARED);
         return effects;
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
         state.selection.is_marking = true;
-        return prompt(
-            state,
-            "drag a rectangle: it is rendered first; z again takes what is around the crosshair",
-        );
+        return prompt(state, messages::DRAG_REGION);
     }
     take(state, around(state.selection.crosshair))
 }
 
-/// No drag is waited for any more; one under way is none.
+/// Stops waiting for a drag and cancels one in progress.
 pub(super) fn leave(state: &mut State) {
     if std::mem::take(&mut state.selection.is_marking) {
         (state.request.first_section, state.selection.press) = (None, None);
     }
 }
 
-/// The hand has come from one place to another.
+/// Updates the region during a drag.
 pub(super) fn drag(state: &mut State, from: Spot, to: Spot) {
     state.request.first_section = Some(Section::between(from, to));
     state.dirty = true;
 }
 
-/// Ends a drag: takes the marked rectangle, else one around the place.
+/// Ends a drag with the marked region, or one around the position.
 pub(super) fn release(state: &mut State, spot: Option<Spot>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
         (Some(marked), _) => take(state, marked),
@@ -57,17 +56,13 @@ fn around(spot: Spot) -> Section {
 fn take(state: &mut State, section: Section) -> Vec<Effect> {
     state.selection.is_marking = false;
     state.request.first_section = Some(section);
-    let words = if state.work.is_running() {
-        "the rectangle is rendered first; z ends that"
-    } else {
-        "the rectangle is rendered first from the next render on; z ends that"
-    };
+    let words = if state.work.is_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
     let effects = again(state);
     say(state, words);
     effects
 }
 
-/// The render under way, in another order: it keeps what it has.
+/// Restarts the running render with another order; it keeps its samples.
 fn again(state: &mut State) -> Vec<Effect> {
     state.dirty = true;
     if state.work.is_running() && !state.work.paused { render(state, false) } else { Vec::new() }

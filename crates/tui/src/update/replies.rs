@@ -1,4 +1,4 @@
-//! Answers of the terminal about itself.
+//! Handles terminal replies about its capabilities.
 
 use super::request::resized_preview;
 use super::say::say_until_key;
@@ -13,7 +13,7 @@ use crate::terminal_replies::TerminalReply;
 use crate::terminals::TerminalId;
 use crate::view::ramp;
 
-/// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
+/// Uses newly confirmed capabilities, if they were queried.
 pub(super) fn learn(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let mut effects = judge(state, answer);
     match answer {
@@ -42,7 +42,7 @@ pub(super) fn learn(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     effects
 }
 
-/// What an answer says about requested pixels.
+/// What a reply reveals about the requested pixels.
 enum PixelSupport {
     Nothing,
     Has,
@@ -71,7 +71,7 @@ fn verdict(request: PixelRequest, answer: TerminalReply) -> PixelSupport {
     }
 }
 
-/// Draws in pixels from now on if the answer says that the terminal has them.
+/// Switches to pixels if a reply confirms that the terminal supports them.
 fn judge(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let Some(request) = state.display.pixels else { return Vec::new() };
     match verdict(request, answer) {
@@ -90,7 +90,7 @@ fn judge(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     }
 }
 
-/// Says, once, that the terminal does not show pixels. A late answer is still heard.
+/// Reports once that the terminal does not support pixels. A late confirmation is still accepted.
 pub(super) fn lack_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
@@ -104,7 +104,7 @@ fn show(state: &mut State, depth: ColorDepth) {
     state.dirty = true;
 }
 
-/// Takes the terminal's name: its blocks and its other abilities, if glimt asked for them.
+/// Uses the terminal's name for its block characters and other capabilities, if it was queried.
 fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
     let ask = state.display.ask;
     let mut effects = Vec::new();
@@ -146,7 +146,7 @@ mod tests {
     use crate::terminals::{Brand, Capabilities};
     use crate::update::start;
 
-    /// A desk of a user who wants kitty's images.
+    /// A user interface whose user requested kitty images.
     fn wanting_pixels(route: ImageRoute) -> TestUi {
         let mut state = state(80, 24);
         let request = PixelRequest { protocol: Protocol::Kitty, route, is_known: false };
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_are_drawn_once_the_terminal_confirms_them() {
+    fn pixels_are_drawn_once_confirmed() {
         let mut ui = wanting_pixels(ImageRoute::Direct);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         let effects = ui.event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_terminal_without_pixels_is_told_of_and_gets_half_blocks() {
+    fn missing_pixel_support_is_reported_once() {
         let mut ui = wanting_pixels(ImageRoute::Direct);
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
         assert!(ui.text().contains("this terminal shows no kitty images"), "{}", ui.text());
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_closed_tmux_is_told_of_after_a_second_and_a_late_answer_counts() {
+    fn closed_tmux_is_reported_after_a_second() {
         let mut ui = wanting_pixels(ImageRoute::Tmux);
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
         ui.wait(900);
@@ -194,12 +194,12 @@ mod tests {
     }
 
     #[test]
-    fn a_terminal_that_draws_octants_gets_a_finer_picture() {
+    fn octants_give_a_finer_preview() {
         let mut state = state(80, 24);
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] });
-        assert!(learn(&mut state, foot).is_empty(), "nobody asked");
+        assert!(learn(&mut state, foot).is_empty(), "not queried");
         assert_eq!(state.display.capabilities, Capabilities::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
         let effects = learn(&mut state, foot);
@@ -209,17 +209,17 @@ mod tests {
     }
 
     #[test]
-    fn a_terminal_that_says_its_name_can_what_it_is_known_for() {
+    fn terminal_name_sets_the_capabilities() {
         let mut state = state(80, 24);
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: Brand::Ghostty, version: [1, 2] };
         assert!(matches!(learn(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
         assert_eq!(state.display.capabilities, ghostty.capabilities());
-        assert!(learn(&mut state, TerminalReply::Name(ghostty)).is_empty(), "it reports the focus already");
+        assert!(learn(&mut state, TerminalReply::Name(ghostty)).is_empty(), "focus reports are already on");
     }
 
     #[test]
-    fn colors_and_background_are_believed_when_they_were_asked() {
+    fn only_queried_colors_are_used() {
         let mut state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::Ansi16, Default::default());
         let answers = [
             TerminalReply::Ink { index: 1, rgb: [180, 30, 30] },

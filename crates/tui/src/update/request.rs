@@ -6,9 +6,9 @@ use crate::pipeline::protocol::{Command, Request, Writing};
 use crate::state::{Activity, CameraStep, Rendering, State, Toggles};
 use crate::view::layout::Layout;
 
-/// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
+/// Creates a request with the current settings. The table of stages stays until the worker starts on it.
 pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
-    // A camera on its way has too many pictures.
+    // A moving camera would fill the history.
     if state.request.camera_step.generation == Some(state.request.generation) {
         state.picture.history.drop_unfinished(state.request.generation);
     } else {
@@ -19,7 +19,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     let now = Toggles { exposure: before.exposure, ..state.request.toggles };
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
-        // The same light, shown brighter or darker.
+        // The exposure changes only how the image is shown.
         state.picture.history.go_on(state.request.generation);
     }
     state.request.generation += 1;
@@ -30,7 +30,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
-    // A save that this answers says so afterwards.
+    // Set again once this request is known to answer a save.
     (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
     state.overlays.are_warnings_known = false;
@@ -56,7 +56,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     effects
 }
 
-/// Requests the same picture at another size, if the window changed; the render goes on.
+/// Requests the same image at a new preview size if the window changed, without restarting the render.
 pub(super) fn resized_preview(state: &mut State) -> Vec<Effect> {
     let size = Layout::preview_size(state);
     if size == state.request.preview_size || size.is_none() {

@@ -5,16 +5,16 @@ use std::time::Duration;
 use crate::event::Effect;
 use crate::state::{Message, State};
 
-/// Time for which a notice is shown.
+/// Duration of a notice.
 const NOTICE: Duration = Duration::from_secs(4);
 
-/// Shows a notice: until the next key, for four seconds at most.
+/// Shows a notice until the next key, for at most four seconds.
 pub(crate) fn say(state: &mut State, words: impl Into<String>) {
     let until = Some(state.now + NOTICE);
     show(state, Message { words: words.into(), until });
 }
 
-/// Shows a message until the next key: a fault, or a prompt for what has to follow.
+/// Shows an error or a prompt until the next key.
 pub(super) fn say_until_key(state: &mut State, words: impl Into<String>) {
     show(state, Message { words: words.into(), until: None });
 }
@@ -24,13 +24,13 @@ fn show(state: &mut State, message: Message) {
     state.dirty = true;
 }
 
-/// Shows a notice; no effect follows.
+/// Shows a notice; returns no effects.
 pub(super) fn notify(state: &mut State, words: &str) -> Vec<Effect> {
     say(state, words);
     Vec::new()
 }
 
-/// Shows a message until the next key; no effect follows.
+/// Shows a message until the next key; returns no effects.
 pub(super) fn prompt(state: &mut State, words: &str) -> Vec<Effect> {
     say_until_key(state, words);
     Vec::new()

@@ -1,4 +1,4 @@
-//! Keys of the list of views, while it is open: they walk it, find a name and close it.
+//! Keys of the open list of views: navigation, search, closing.
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
@@ -6,13 +6,14 @@ use super::request::render;
 use super::say::say;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
-use crate::keymap::Overlay;
+use crate::keymap::OverlayAction;
+use crate::messages;
 use crate::pipeline::settings::View;
 use crate::state::State;
 use crate::view::views::rows;
 
-/// Effect of a bound key on the list. `None` if the list is closed, or covered by the help.
-pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> {
+/// Handles an overlay action. `None` if the list is closed or covered by the help.
+pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Effect>> {
     if state.overlays.views.is_none() || state.overlays.help.open {
         return None;
     }
@@ -20,27 +21,27 @@ pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> 
     let last = View::ALL.len() - 1;
     let column = rows(state);
     let chosen = match action {
-        Overlay::LineUp => current.saturating_sub(1),
-        Overlay::LineDown => (current + 1).min(last),
-        Overlay::ColumnLeft => current.checked_sub(column).unwrap_or(current),
-        Overlay::ColumnRight if current + column <= last => current + column,
-        Overlay::ColumnRight => current,
-        Overlay::PageUp => 0,
-        Overlay::PageDown => last,
-        Overlay::Find => {
+        OverlayAction::LineUp => current.saturating_sub(1),
+        OverlayAction::LineDown => (current + 1).min(last),
+        OverlayAction::ColumnLeft => current.checked_sub(column).unwrap_or(current),
+        OverlayAction::ColumnRight if current + column <= last => current + column,
+        OverlayAction::ColumnRight => current,
+        OverlayAction::PageUp => 0,
+        OverlayAction::PageDown => last,
+        OverlayAction::Find => {
             look_for(state, String::new());
             return Some(Vec::new());
         }
-        Overlay::Take => {
+        OverlayAction::Take => {
             close(state);
             return Some(Vec::new());
         }
-        Overlay::Close => return None,
+        OverlayAction::Close => return None,
     };
     Some(choose(state, View::ALL[chosen]))
 }
 
-/// Effect of a key while a name is typed. `None` if none is.
+/// Handles a key while a name is typed. `None` otherwise.
 pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.contains(KeyModifiers::CONTROL);
@@ -58,24 +59,21 @@ pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     Some(found.map_or_else(Vec::new, |view| choose(state, view)))
 }
 
-/// This view, in the list of them.
+/// Chooses a view and opens the list.
 pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
     state.request.toggles.view = (view != state.request.base_view()).then_some(view);
     let effects = render(state, false);
     if state.request.toggles.view.is_some() {
         let is_empty = view == View::Photons && !state.request.photons();
-        let words = if is_empty {
-            ": photons are off; p turns them on"
-        } else {
-            " (preview only). w: save image · 0: reset"
-        };
-        say(state, format!("view {}{words}", view.name()));
+        let words =
+            if is_empty { messages::VIEW_WITHOUT_PHOTONS.to_owned() } else { messages::view(view.name()) };
+        say(state, words);
     }
     effects
 }
 
-/// The first view whose name begins with this, else the first that has it anywhere.
+/// The first view whose name starts with `name`, else the first that contains it.
 fn found(name: &str) -> Option<View> {
     let begins = |view: &&View| view.name().starts_with(name);
     let has = |view: &&View| view.name().contains(name);
@@ -95,7 +93,7 @@ fn close(state: &mut State) {
     state.dirty = true;
 }
 
-/// The view that stands already is not rendered again.
+/// Chooses a view unless it is the current one.
 fn choose(state: &mut State, view: View) -> Vec<Effect> {
     state.list_views();
     if view == state.request.view() {

@@ -1,4 +1,4 @@
-//! Effects of the worker's events on the state. Events of older generations do nothing, except for those about files.
+//! Handles worker events. Events of older generations are ignored, except those about files.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -8,6 +8,7 @@ use super::say::{say, say_until_key};
 use super::{camera, history, pointer};
 use crate::event::{Effect, WriteFailure};
 use crate::exit_summary;
+use crate::messages;
 use crate::noise_curve::NoiseCurve;
 use crate::options::OutputChange;
 use crate::pipeline::protocol::{
@@ -19,14 +20,9 @@ use crate::scene::sanitize::visible;
 use crate::state::{Activity, AssetBar, OwnImage, Pane, Problems, Rendering, State, WrittenFile};
 use crate::window_title;
 
-/// Why a picture that is not on disk is not there.
-const UNWRITTEN: &str = "not written: e says why";
-/// Message that ends with the render.
-const GOING_ON: &str = "resuming from";
-
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
-        // Whatever is rendered meanwhile, these answer a person.
+        // Replies to the user are never outdated.
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
         Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
@@ -34,7 +30,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             wrote(state, &paths);
             return Vec::new();
         }
-        // Files of pictures of before are there all the same.
+        // Images of earlier requests may still be written.
         Event::Written { path, bytes, generation, is_own } if generation != state.request.generation => {
             note(state, path, bytes, (generation, is_own));
             return Vec::new();
@@ -48,7 +44,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     if generation(&event) != state.request.generation {
         return Vec::new();
     }
-    // The picture itself is taken from its slot; what is watched is the wiring's.
+    // Previews are taken from their slot, and the watcher handles the files.
     let shows_nothing = matches!(event, Event::Preview { .. } | Event::Files { .. });
     state.dirty |= !shows_nothing;
     match event {
@@ -64,9 +60,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             mended(state);
             state.picture.history.read();
             if pinhole {
-                say(state, "no depth of field: the camera's `aperture` is 0");
+                say(state, messages::PINHOLE);
             }
-            // A picture of another shape has another place.
+            // The size of the preview depends on the image's shape.
             return resized_preview(state);
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
@@ -95,9 +91,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
-            // What a key asks for during a render tells nothing of the picture at its end.
+            // A write requested during the render says nothing about the final image.
             if !is_by_hand || state.work.activity == Activity::Done {
-                state.saving.unwritten = Some(UNWRITTEN.to_owned());
+                state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
             }
             let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
             state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
@@ -111,17 +107,14 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 say_until_key(state, format!("warning: {}", visible(&message)));
             }
             CheckpointNews::Resumed { path, .. } => {
-                say(state, format!("{GOING_ON} {}", visible(&path.to_string_lossy())));
+                say(state, format!("{} {}", messages::RESUMING, visible(&path.to_string_lossy())));
             }
             CheckpointNews::SetAside { path } => {
-                say_until_key(
-                    state,
-                    format!("the checkpoint of another render is {}", visible(&path.to_string_lossy())),
-                );
+                say_until_key(state, messages::checkpoint_kept(&visible(&path.to_string_lossy())));
             }
             CheckpointNews::Unused { path, why } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                say_until_key(state, format!("{} is not used: {}", visible(&name), visible(&why)));
+                say_until_key(state, messages::checkpoint_ignored(&visible(&name), &visible(&why)));
             }
             CheckpointNews::Written { .. }
             | CheckpointNews::Finished { .. }
@@ -131,7 +124,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
-            say(state, "the image is written as soon as every pixel has a sample");
+            say(state, messages::WRITE_POSTPONED);
         }
         Event::Done { report, warnings, unchanged, .. } => {
             let time = state.work.rendering_for(state.now);
@@ -153,7 +146,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     Vec::new()
 }
 
-/// Tells a person who is looking elsewhere that a long render has ended, if the terminal has a way.
+/// Notifies a user who is working in another window that a long render has ended, if the terminal supports
+/// it.
 fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
     let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
     let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
@@ -202,7 +196,7 @@ fn started(state: &mut State) {
     state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
-    // An image in its file stays there until samples of another are traced.
+    // A written image stays valid until samples of another one are traced.
     if state.request.is_own() && state.saving.own.state != OwnState::Written {
         state.saving.own = OwnImage { state: OwnState::Begun { is_rendering: true }, fraction: 0.0 };
     }
@@ -211,7 +205,7 @@ fn started(state: &mut State) {
 }
 
 fn record(state: &mut State, stage: StageReport) {
-    // The bars of a stage go with it.
+    // The progress bars of a stage disappear with it.
     if stage.status != Status::Running {
         state.work.assets.clear();
     }
@@ -220,7 +214,7 @@ fn record(state: &mut State, stage: StageReport) {
     }
 }
 
-/// One bar for each name.
+/// Updates the progress bar of an asset; there is one per name.
 fn asset(state: &mut State, progress: AssetProgress) {
     let finished = (progress.done >= progress.total).then_some(state.now);
     let bar = AssetBar { progress, finished };
@@ -230,18 +224,18 @@ fn asset(state: &mut State, progress: AssetProgress) {
     }
 }
 
-/// The files that a key asked for are there.
+/// Reports the files written with a key.
 fn wrote(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
     let is_open = state.picture.history.is_open();
-    let which = if is_open { ": the newest picture, not the one that is shown" } else { "" };
+    let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
     say(state, format!("wrote {}{which}", names.join(", ")));
 }
 
-/// A file is there. It stands beside the picture: a message about each would cover the keys.
+/// Records a written file. It is shown beside the image, since a message would cover the keys.
 fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
-    // Of several outputs, another one may have failed.
+    // Other outputs may still have failed.
     let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
@@ -250,7 +244,7 @@ fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (
     note(state, path, bytes, (generation, is_own));
 }
 
-/// A picture is in a file. Its render may go on; a report that is there already is of this picture.
+/// Records an image in a file. Its render may still be running; an existing report belongs to the same image.
 fn note(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
     let view = if is_own { state.request.base_view() } else { state.request.view() };
     let made = match &state.work.report {
@@ -267,7 +261,7 @@ fn note(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64
     state.saving.written.push(written);
 }
 
-/// Describes the files of a finished request, if it wrote its picture at the end.
+/// Adds the description to the files of a finished request.
 fn describe(state: &mut State, generation: u64, report: &Report) {
     let (is_written, base) = (report.image.path.is_some(), state.request.base_view());
     for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
@@ -278,7 +272,7 @@ fn describe(state: &mut State, generation: u64, report: &Report) {
     }
 }
 
-/// Another program has changed a file that glimt wrote, or put it back.
+/// Handles a change of an output file by another program.
 pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &OutputChange) -> Vec<Effect> {
     let Some(written) = state.saving.written.iter_mut().find(|written| written.path == *path) else {
         return Vec::new();
@@ -286,16 +280,16 @@ pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &Ou
     (written.lost, state.dirty) = (*lost, true);
     if let Some(lost) = lost {
         let name = visible(&path.to_string_lossy()).into_owned();
-        say_until_key(state, format!("{name} {} · w writes it again", lost.words()));
+        say_until_key(state, messages::output_changed(&name, lost.words()));
     }
     Vec::new()
 }
 
-/// Shows new conflicts at once; a pane that a person has closed stays closed.
+/// Shows new conflicts immediately. A pane that the user closed stays closed unless they are new.
 fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
-    state.saving.unwritten = Some(UNWRITTEN.to_owned());
-    say(state, "nothing is written (e shows why)");
+    state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
+    say(state, messages::NOT_WRITTEN);
     let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
     let generation = state.request.generation;
     state.saving.write_failed = Some(WriteFailure { why, generation, is_refused: true });
@@ -306,7 +300,7 @@ fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.overlays.warnings.splice(0..0, conflicts);
 }
 
-/// The file is whole again.
+/// Removes the problems once the file is valid again.
 fn mended(state: &mut State) {
     if state.overlays.problems.take().is_some() {
         state.overlays.diagnostics = Pane::default();
@@ -315,7 +309,7 @@ fn mended(state: &mut State) {
 
 fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
     add_earlier_seconds(&mut report);
-    state.overlays.message.take_if(|message| message.words.starts_with(GOING_ON));
+    state.overlays.message.take_if(|message| message.words.starts_with(messages::RESUMING));
     mended(state);
     for stage in &report.stages {
         record(state, stage.clone());
@@ -324,7 +318,7 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     (state.work.activity, state.work.rendering) = (Activity::Done, Rendering::Finished);
     state.set_paused(false);
     state.work.assets.clear();
-    // The picture of this request is on disk: none is missing any more.
+    // The image of this request is on disk, so none is missing.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
     if state.request.is_own() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
@@ -346,7 +340,7 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     }
 }
 
-/// Counts the seconds in which earlier requests rendered samples of this image to its render, whose samples they are.
+/// Adds the time in which earlier requests rendered samples of this image.
 fn add_earlier_seconds(report: &mut Report) {
     let all = report.image.render_seconds;
     let render = &mut report.stages[Stage::Render as usize];
@@ -356,7 +350,7 @@ fn add_earlier_seconds(report: &mut Report) {
     }
 }
 
-/// Counts a finished run, unless it found the newest picture as another run had left it.
+/// Counts a finished render, unless it found the newest image unchanged.
 fn count(state: &mut State, unchanged: bool) {
     let is_new = !unchanged && !state.request.is_exposure_only;
     let is_shown = state.picture.history.is_newest(state.request.generation);
@@ -368,7 +362,8 @@ fn count(state: &mut State, unchanged: bool) {
     }
 }
 
-/// Ends the curve of noise with what was measured. The same picture, or that picture brighter, has the curve that it had.
+/// Completes the noise curve with the measured result. An unchanged image, or one with another exposure,
+/// keeps its curve.
 fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
     let origin = state.request.origin(false).of_light();
@@ -394,18 +389,18 @@ fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
     state.overlays.are_warnings_known = true;
 }
 
-/// Closes the pane of errors if nothing is left in it.
+/// Closes the pane of diagnostics if it is empty.
 fn close_empty_pane(state: &mut State) {
     state.overlays.diagnostics.open &= state.overlays.problems.is_some() || !state.reported().is_empty();
 }
 
-/// Holds back errors in a file that may be half written until they persist.
+/// Holds back errors in a file that may be incomplete until they persist.
 fn failed(state: &mut State, failure: Failure) {
     state.set_paused(false);
     state.work.assets.clear();
     state.saving.change = None;
     match failure {
-        // The last good scene is rendered.
+        // The last valid scene is rendered.
         Failure::Scene(_) => state.picture.history.broken(),
         Failure::Work(_) => state.work.rendering = Rendering::Stopped,
     }
@@ -419,7 +414,7 @@ fn failed(state: &mut State, failure: Failure) {
     }
 }
 
-/// The render of the last good scene, whose picture is the newest while the file is broken, has ended.
+/// Handles the end of the render of the last valid scene while the file is broken.
 fn last_good_ended(state: &mut State, end: LastGoodEnd) {
     match end {
         LastGoodEnd::Finished { unchanged } => {
@@ -431,7 +426,7 @@ fn last_good_ended(state: &mut State, end: LastGoodEnd) {
     }
 }
 
-/// Shows new problems; a pane that a person has closed stays closed.
+/// Shows new problems. A pane that the user closed stays closed unless they are new.
 fn broken(state: &mut State, problems: Problems) {
     state.work.activity = Activity::Broken;
     if state.overlays.problems.as_ref() != Some(&problems) {
@@ -441,7 +436,7 @@ fn broken(state: &mut State, problems: Problems) {
     state.dirty = true;
 }
 
-/// Nobody is writing the files any more: what was found wrong with them is so.
+/// Shows errors that were held back, because the files are now complete.
 pub(super) fn settled(state: &mut State) {
     state.saving.is_settled = true;
     if let Some(diagnostics) = state.overlays.unconfirmed.take() {

@@ -1,4 +1,4 @@
-//! Noise against time as a small curve, with the requested `error` as a line. Both axes are logarithmic.
+//! A small log-log chart of noise over time, with the requested `error` as a line.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -9,24 +9,25 @@ use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
 use super::text::{Tone, put, row, seconds, share, wrapped};
 use crate::color::ColorDepth;
+use crate::messages;
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// Rows of the curve itself.
+/// Minimum and maximum rows of the chart.
 const LEAST_ROWS: u16 = 6;
 const MOST_ROWS: u16 = 12;
-/// More columns say no more.
+/// More columns show no more detail.
 const MOST_COLUMNS: u16 = 60;
-/// A curve has so many points at least, and its times differ by this factor.
+/// A curve needs this many points, whose times differ by this factor.
 const LEAST_POINTS: usize = 3;
 const LEAST_RATIO: f64 = 1.5;
 
-/// Draws it from the top of an area. Returns the rows that it takes: none if there is nothing to draw, or no room.
+/// Draws the chart at the top of an area. Returns the rows used: 0 if there is no curve or no room.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let area = Rect { width: area.width.min(MOST_COLUMNS), ..area }.intersection(buffer.area);
     let (Some(rows), Some(points)) = (rows(state, area), points(state)) else { return 0 };
     let depth = state.display.depth;
-    put(buffer, row(area, 0), &[("noise while it rendered", Tone::Strong)], depth);
+    put(buffer, row(area, 0), &[(messages::NOISE_OVER_TIME, Tone::Strong)], depth);
     let caption = caption(state, points, area.width);
     let chart = Rect { y: area.y + 1, height: rows - 1 - caption.len() as u16, ..area };
     plot(state, points, chart, buffer);
@@ -36,29 +37,29 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     rows
 }
 
-/// Rows of the curve with its words. `None` if they do not fit.
+/// Rows of the chart with its caption. `None` if they do not fit.
 pub(super) fn rows(state: &State, area: Rect) -> Option<u16> {
     let words = 1 + caption(state, points(state)?, area.width.min(MOST_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MOST_ROWS);
     (chart >= LEAST_ROWS && area.width >= 20).then_some(words + chart)
 }
 
-/// The points of the picture at hand, if they are a curve.
+/// The points of the current image, if they form a curve.
 fn points(state: &State) -> Option<&[(f64, f64)]> {
     let points = state.work.curve.points();
     let [(first, _), .., (last, _)] = points else { return None };
     (points.len() >= LEAST_POINTS && *last >= first * LEAST_RATIO).then_some(points)
 }
 
-/// The requested noise of each tile.
+/// The requested noise per tile.
 fn target(state: &State) -> Option<f64> {
     state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
 }
 
-/// A blank at which no line ends.
+/// No-break space.
 const UNBROKEN: &str = "\u{a0}";
 
-/// Caption of the curve, in plain words; a number stays with its unit.
+/// The caption in words; numbers stay together with their units.
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let whole = |amount: String| amount.replace(' ', UNBROKEN);
@@ -66,10 +67,10 @@ fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let (to, last) = (whole(share(*to)), whole(seconds(*last)));
     let fell = format!("{from} after {first}, {to} after {last}");
     let line = match target(state) {
-        Some(target) => format!(
-            "; the line is the {} asked of each tile",
-            whole(share(f64::from((target * 1e6).round() as f32) / 1e6))
-        ),
+        Some(target) => {
+            let share = whole(share(f64::from((target * 1e6).round() as f32) / 1e6));
+            format!("; {}", messages::noise_target(&share))
+        }
         None => String::new(),
     };
     wrapped(&(fell + &line), usize::from(width)).iter().map(|line| line.replace(UNBROKEN, " ")).collect()
@@ -86,7 +87,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
     let target = target(state).map(f64::log10);
     let (x, y) = (ends(&|point| point.0, None), ends(&|point| point.1, target));
     let line = target.map(|target| [(x[0], target), (x[1], target)]);
-    // A line along the edge would not be seen.
+    // A line at the edge would not be visible.
     let margin = 0.05 * (y[1] - y[0]).max(0.1);
     let bounds = [y[0] - margin, y[1] + margin];
     let style = |tone: Tone| tone.style(depth);
@@ -109,7 +110,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
         .render(area, buffer);
 }
 
-/// Dots of eighths of a cell, where the terminal is likely to draw them.
+/// Braille dots if the terminal is likely to have them.
 fn marker(state: &State) -> Marker {
     let is_simple = state.display.kind == PreviewKind::Ascii
         || matches!(state.display.depth, ColorDepth::Ansi16 | ColorDepth::None);

@@ -1,4 +1,4 @@
-//! The pane of errors and warnings: beside the picture, else over its lower part.
+//! The pane of errors and warnings, beside the image or over its lower part.
 
 use std::collections::HashMap;
 
@@ -14,13 +14,13 @@ use crate::scene::report::{self, Role};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
-/// Faults that are shown; who mends them sees the next ones.
+/// Maximum number of faults shown; the rest appears once these are fixed.
 const MOST: usize = 100;
 
-/// Places of one fault that are shown.
+/// Maximum number of positions shown per fault.
 const MOST_PLACES: usize = 10;
 
-/// Draws it, from the line that the person scrolled to.
+/// Draws the pane from its scroll position.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     let text = text(state, area);
@@ -35,7 +35,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// The cells that it lies over. Empty while it is closed.
+/// The cells that the pane covers. Empty while it is closed.
 pub(super) fn covered(state: &State) -> Rect {
     let Layout { pane, panel, .. } = Layout::of(state);
     if state.overlays.diagnostics.open {
@@ -45,7 +45,7 @@ pub(super) fn covered(state: &State) -> Rect {
     }
 }
 
-/// The lower part of an area that these lines and their title need; all of a panel.
+/// The lower part of an area that the lines and the title need; a panel is used completely.
 fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
         return area;
@@ -54,7 +54,7 @@ fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
     Rect { y: area.bottom() - height, height, ..area }
 }
 
-/// A rule with the number of errors, and which lines are in sight where these are not all.
+/// Draws a rule with the number of errors and, if not all lines fit, the visible range.
 fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
     let reported = state.reported();
     let has_error = reported.iter().any(|one| one.severity == Severity::Error);
@@ -74,7 +74,7 @@ fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer
     put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
-/// Lines on a page of the pane, and the furthest line that it can be scrolled to.
+/// Lines per page, and the maximum scroll position.
 pub(crate) fn extent(state: &State) -> (usize, usize) {
     let area = Layout::of(state).pane;
     let text = text(state, area);
@@ -97,7 +97,7 @@ fn text(state: &State, area: Rect) -> Vec<StyledLine> {
     text
 }
 
-/// Lines of the diagnostics, errors first; a fault in several places appears once, with all of them.
+/// Lines of the diagnostics, errors first. A fault at several positions appears once.
 fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     let mut numbers = HashMap::new();
     let mut faults: Vec<Vec<&Diagnostic>> = Vec::new();
@@ -126,7 +126,7 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     lines
 }
 
-/// The first place in full, the others by line and column; an empty line.
+/// The first position in full, the others as line and column, then an empty line.
 fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let tone = |role| match role {
         Role::Text => Tone::Plain,
@@ -137,7 +137,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     };
     let line = |line: report::Line| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
     let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
-    // The report ends with an empty line and a count, which stands in the title.
+    // The report ends with an empty line and a count, which the title shows already.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
     let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();

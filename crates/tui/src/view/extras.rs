@@ -1,4 +1,4 @@
-//! Parts of the screen besides cells, as drawn last.
+//! Parts of the screen with special handling: file names and delayed cells.
 
 use std::path::PathBuf;
 
@@ -9,17 +9,17 @@ use super::text::{Tone, columns, put};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
-/// Links, and cells that wait for the picture.
+/// File names to link, and cells to draw after the preview.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct ViewExtras {
-    /// Cells of names of files.
+    /// Cells of file names.
     pub(crate) files: Vec<(Rect, PathBuf)>,
-    /// Cells that come after the picture over a thin line.
+    /// Cells that are drawn after the preview on a slow connection.
     pub(crate) later: Rect,
 }
 
 impl ViewExtras {
-    /// Writes the pieces of a line, and notes where names of written files are. Returns the columns used.
+    /// Writes a line and records the cells of file names. Returns the columns used.
     pub(super) fn put(
         &mut self,
         state: &State,

@@ -1,4 +1,4 @@
-//! The line at the top: what is going on, of what, and how far it is. Where the picture is alone it is all there is.
+//! The header: state, scene and progress. With `tab`, it is the only line besides the image.
 
 use std::time::Duration;
 
@@ -13,6 +13,7 @@ use crate::action::Action;
 use crate::choice::Choice;
 use crate::history::ago;
 use crate::keymap;
+use crate::messages;
 use crate::pipeline::protocol::RenderProgress;
 use crate::pipeline::settings::View;
 use crate::pipeline::words::Eta;
@@ -20,16 +21,16 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, State};
 
-/// From this width on there is room for that.
+/// Width from which the state block has a fixed width.
 const WIDE: u16 = 60;
-/// A name of fewer columns says nothing.
+/// Minimum columns of a shortened name.
 const LEAST_NAME: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.header;
     let used = block(state, area, buffer);
     let mut room = rest(area, used + 1);
-    // Where there is no other line for a message it takes all of this one.
+    // Without another line, a message takes the whole header.
     if layout.keys.is_empty() && message::is_said(state, layout) {
         return;
     }
@@ -39,7 +40,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
     let figures = figures(state);
-    // The name has room beside them, if the shortest of them leave it.
+    // Keep some room for the name if the shortest figures allow it.
     let fitting = [LEAST_NAME + 1, 0]
         .into_iter()
         .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
@@ -51,7 +52,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// The state in its color. Returns the columns used.
+/// Draws the state block. Returns the columns used.
 fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let (sign, word, tone) = activity(state);
     let mut text = format!(" {sign} {word} ");
@@ -67,7 +68,7 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     end - area.x
 }
 
-/// A sign, a word and a color, each of which tells it.
+/// Symbol, word and color of the state, each of which identifies it.
 pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
     if state.picture.history.is_open() { ("◂", "older", Tone::Warning) } else { work(state) }
 }
@@ -85,24 +86,24 @@ fn work(state: &State) -> (&'static str, &'static str, Tone) {
     }
 }
 
-/// The word for the work, whatever picture is looked at.
+/// The word for the state of the work, regardless of the image shown.
 pub(super) fn word(state: &State) -> &'static str {
     work(state).1
 }
 
-/// The file with its folder, the view, the picture's size.
+/// Draws the scene's path, the view and the image size.
 fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     let path = state.request.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
-    // The size of an older picture is not known.
+    // The size of older renders is not known.
     let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_open());
     let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = close_up(state) + &view(state);
     let view = (&*view, Tone::Strong);
     let mut pieces = vec![(&*folder, Tone::Faint), (&*file, Tone::Strong), view, (&*size, Tone::Faint)];
-    // What does not fit is left out before the name is cut.
+    // Leave out parts before cutting the name.
     let width = |pieces: &[(&str, Tone)]| pieces.iter().map(|(text, _)| columns(text)).sum::<u16>();
     if width(&pieces) > area.width {
         pieces.remove(0);
@@ -113,7 +114,7 @@ fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     put(buffer, area, &pieces, state.display.depth);
 }
 
-/// The view, unless it is beauty, and its range.
+/// The view and its range, unless it is beauty.
 fn view(state: &State) -> String {
     let open = state.picture.history.origin_of_open();
     let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
@@ -129,7 +130,7 @@ fn view(state: &State) -> String {
     format!("  view {}{range}", view.name())
 }
 
-/// Whether the picture at hand lacks the light that photons bring.
+/// Whether the current preview lacks the light of photons.
 fn lacks_photons(state: &State) -> bool {
     state
         .picture
@@ -138,29 +139,29 @@ fn lacks_photons(state: &State) -> bool {
         .is_some_and(|shown| shown.lacks_photons && shown.generation == state.request.generation)
 }
 
-/// Whether the picture is shown pixel by pixel.
+/// Mark of a preview at actual pixels.
 fn close_up(state: &State) -> String {
     let is_close = state.picture.shown.as_ref().is_some_and(|shown| shown.section.is_some());
     if is_close { "  1:1".to_owned() } else { String::new() }
 }
 
-/// Progress or result, in full and in short.
+/// Progress or result, from long to short.
 fn figures(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.place() {
         let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", last_run(state));
-                (place.clone(), format!("picture {place}"))
+                (place.clone(), format!("render {place}"))
             }
             None => {
-                let place = if is_unfinished { "unfinished" } else { "older" };
-                (place.to_owned(), format!("{place} picture"))
+                let place = if is_unfinished { messages::STOPPED } else { "older" };
+                (place.to_owned(), format!("{place} render"))
             }
         };
         let age = ago(state.now.saturating_duration_since(time));
         let mut figures = vec![format!("{words}, {age}"), place.clone()];
-        // The newest one is at work meanwhile.
+        // The newest render continues in the background.
         if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
             let done = format!("newest {} %", percent(progress.fraction));
             let eta = eta(state, progress);
@@ -175,7 +176,7 @@ fn figures(state: &State) -> Vec<String> {
         return figures;
     }
     if state.work.is_running() && lacks_photons(state) {
-        return ["shown without photons yet", "no photons yet"].map(str::to_owned).to_vec();
+        return [messages::WITHOUT_PHOTONS, "no photons yet"].map(str::to_owned).to_vec();
     }
     match (state.work.activity, &state.work.report, &state.work.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {
@@ -186,22 +187,22 @@ fn figures(state: &State) -> Vec<String> {
             at_work(state).map(|name| format!("{name}…")).into_iter().collect()
         }
         (Activity::Done, _, _) if state.work.unchanged => {
-            vec![format!("unchanged · run {}", state.work.renders), "unchanged".to_owned()]
+            vec![format!("unchanged · render {}", state.work.renders), "unchanged".to_owned()]
         }
         (Activity::Done, Some(report), _) => {
             let time = seconds(report.seconds);
-            vec![format!("{time} · run {}", state.work.renders), time]
+            vec![format!("{time} · render {}", state.work.renders), time]
         }
-        (Activity::Waiting, _, _) => vec!["for the file to be whole".to_owned()],
+        (Activity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
         (Activity::Broken, _, _) if state.overlays.is_scene_missing() => {
-            vec!["waiting for the file".to_owned()]
+            vec![messages::WAITING_FOR_FILE.to_owned()]
         }
         (Activity::Broken, _, _) => vec![errors(state)],
         (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
     }
 }
 
-/// Number of the newest run; of the one under way, if it has a picture.
+/// Number of the newest render, including the running one if it has an image.
 fn last_run(state: &State) -> u64 {
     let history = &state.picture.history;
     let is_under_way =
@@ -209,9 +210,9 @@ fn last_run(state: &State) -> u64 {
     state.work.renders + u64::from(is_under_way)
 }
 
-/// Time until the end, unless the render is paused.
+/// Remaining time, unless the render is paused.
 fn eta(state: &State, progress: &RenderProgress) -> String {
-    /// Less than that rounds to no time at all.
+    /// Less rounds to zero.
     const LEAST: f64 = 0.05;
     let eta = match Eta::of(progress) {
         None => "…".to_owned(),
@@ -222,7 +223,7 @@ fn eta(state: &State, progress: &RenderProgress) -> String {
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }
 
-/// Number of errors, and of warnings if there are any.
+/// Number of errors and warnings.
 pub(super) fn errors(state: &State) -> String {
     let Some(problems) = &state.overlays.problems else { return String::new() };
     let count = |severity| problems.diagnostics.iter().filter(|it| it.severity == severity).count();

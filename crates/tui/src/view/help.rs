@@ -1,4 +1,4 @@
-//! The overlay of keys, made from the tables of keys.
+//! The help overlay, generated from the key tables.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -9,18 +9,18 @@ use super::text::{Tone, columns, put, row, wrapped};
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::state::State;
 
-/// Notes about the rest of the screen.
+/// Explanations of other parts of the screen.
 const NOTES: &[(&str, &str)] = &[
-    ("saved → seen", "from a save to the first changed cell"),
-    ("31 kB sent", "since this render began; the terminal's time to answer"),
-    ("noise 2 % in all", "against the brightness of the whole picture"),
-    ("asked 1 % a tile", "each tile against its own brightness; ✓ all are there"),
-    ("bold", "what the last edit or a key has changed"),
-    ("render 1 s −.3 s", "the time of a stage, and against the last time"),
-    ("run 3", "finished pictures so far; strip and n N have the same number"),
+    ("on screen 9 ms after save", "from a save to the first changed cell"),
+    ("31 kB sent", "bytes of this render; round trip to the terminal"),
+    ("noise 2 %", "relative to the brightness of the whole image"),
+    ("target 1 % per tile", "noise target per tile; ✓ reached everywhere"),
+    ("bold", "changed by the last edit or a key"),
+    ("render 1 s −.3 s", "stage time (difference to the last render)"),
+    ("render 3", "number of finished renders, as in the history"),
 ];
 
-/// In the middle of the screen.
+/// Draws the help in the middle of the screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let area = area(state);
     let inner = inner(area);
@@ -32,7 +32,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
-    // Lines of words that it covers in part would be cut without a mark.
+    // Clear lines that the help covers in part, which would look cut off.
     let Layout { header, under, .. } = Layout::of(state);
     for line in [header, under].into_iter().filter(|line| line.intersects(area)) {
         Clear.render(line.intersection(buffer.area), buffer);
@@ -52,16 +52,16 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     }
 }
 
-/// Columns beside the labels and their texts.
+/// Columns between labels and texts.
 const BESIDE: u16 = 3;
 
-/// Columns of the labels, if the help has `width`.
+/// Columns of the labels in a help of this width.
 fn labels(width: u16) -> u16 {
     const LEAST: u16 = 9;
     widest(|(label, _)| label).min(LEAST.max(width / 3))
 }
 
-/// The entries, each in as many lines as it needs.
+/// The entries, wrapped into lines.
 fn lines(width: u16) -> Vec<(String, String)> {
     let labels = labels(width);
     let both = |(label, help)| {
@@ -74,7 +74,7 @@ fn lines(width: u16) -> Vec<(String, String)> {
     entries().flat_map(both).collect()
 }
 
-/// Lines on a page of the help, and the furthest line that it can be scrolled to.
+/// Lines per page, and the maximum scroll position.
 pub(crate) fn extent(state: &State) -> (usize, usize) {
     let inner = inner(area(state));
     let page = usize::from(inner.height).max(1);
@@ -93,7 +93,7 @@ fn widest(part: impl Fn((&'static str, &'static str)) -> &'static str) -> u16 {
 
 fn area(state: &State) -> Rect {
     let window = Rect::new(0, 0, state.display.window.columns, state.display.window.rows);
-    // The line of keys tells how to scroll and to close.
+    // The line of keys shows how to scroll and close.
     let above = Rect { height: window.height.saturating_sub(u16::from(window.height > 3)), ..window };
     let width = widest(|(label, _)| label) + widest(|(_, help)| help) + BESIDE + 3;
     let wide = centered(above, width, above.height);

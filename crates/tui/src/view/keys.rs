@@ -1,4 +1,4 @@
-//! The line of keys: the toggles with their values, what is of use now, and the way to the rest.
+//! The line of keys: toggles with their values, keys of current use, and the way to the help.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -9,13 +9,13 @@ use super::message;
 use super::text::{Tone, columns, put, rest};
 use crate::action::Action;
 use crate::choice::Choice;
-use crate::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
+use crate::keymap::{self, Binding, KEYMAP, OVERLAY, OverlayAction};
 use crate::preview_kind::PreviewKind;
 use crate::scene::is_mesh;
 use crate::scene::report::summary;
 use crate::state::{Activity, State, Toggles, ViewList};
 
-/// A key with its description, in full and in short.
+/// A key with its description in long and short form.
 struct KeyHint {
     key: &'static str,
     words: String,
@@ -42,9 +42,9 @@ impl KeyHint {
     }
 }
 
-/// Between two of them.
+/// Columns between hints.
 const GAP: u16 = 2;
-/// Columns kept for the hints of use now, before the toggles appear in full.
+/// Columns reserved for keys of current use before toggles are shown in full.
 const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -55,7 +55,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let ways = [KeyHint::of(Action::Quit), KeyHint::of(Action::ToggleHelp)];
     let ways: Vec<KeyHint> = ways.into_iter().flatten().collect();
     let width = |hints: &[KeyHint], is_long| hints.iter().map(|hint| hint.width(is_long)).sum::<u16>();
-    // The help is never left out.
+    // The help key is always shown.
     let skipped = usize::from(area.width < 44 && ways.len() > 1);
     let ways = &ways[skipped..];
     let toggles = if state.overlays.help.open { Vec::new() } else { toggles(state) };
@@ -71,7 +71,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Toggles and what is of use: what is urgent has its place, then the toggles, then what else there is room for.
+/// Combines toggles and other hints: urgent hints get room first, then toggles, then the rest.
 fn fitting(
     (urgent, useful): (Vec<KeyHint>, Vec<KeyHint>),
     toggles: Vec<KeyHint>,
@@ -99,9 +99,9 @@ fn show(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut B
     hint.width(is_long)
 }
 
-/// Each toggle with its value, in bold where the keys have changed it.
+/// Toggles with their values, in bold if keys changed them.
 fn toggles(state: &State) -> Vec<KeyHint> {
-    // They are those of the newest picture.
+    // The toggles describe the newest render.
     if state.picture.history.is_open() {
         return Vec::new();
     }
@@ -130,26 +130,26 @@ fn toggles(state: &State) -> Vec<KeyHint> {
     all.into_iter().filter_map(hint).collect()
 }
 
-/// Hints of use now: the urgent ones, and the others.
+/// Hints of current use: the urgent ones and the others.
 fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
-    let overlay = |wanted: &[Overlay]| -> Vec<KeyHint> {
+    let overlay = |wanted: &[OverlayAction]| -> Vec<KeyHint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
         of.map(|it| KeyHint::new(it.label, it.hint)).collect()
     };
-    let closing = || overlay(&[Overlay::Close]);
-    // The keys that scroll, where something is out of sight.
-    let scrolling = |last: usize, keys: &[Overlay]| if last > 0 { overlay(keys) } else { Vec::new() };
+    let closing = || overlay(&[OverlayAction::Close]);
+    // Scroll keys, if not everything is visible.
+    let scrolling = |last: usize, keys: &[OverlayAction]| if last > 0 { overlay(keys) } else { Vec::new() };
     if state.overlays.help.open {
         let (_, last) = super::help::extent(state);
-        let lines = scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing());
-        return (lines.chain(scrolling(last, &[Overlay::PageDown])).collect(), Vec::new());
+        let lines = scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing());
+        return (lines.chain(scrolling(last, &[OverlayAction::PageDown])).collect(), Vec::new());
     }
     let mut urgent = Vec::new();
     if let Some(views) = &state.overlays.views {
         urgent.extend(of_views(views).into_iter().chain(closing()));
     } else if state.overlays.diagnostics.open {
         let (_, last) = super::diagnostics::extent(state);
-        urgent.extend(scrolling(last, &[Overlay::LineDown]).into_iter().chain(closing()));
+        urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
     }
     urgent.extend(unseen(state));
     let named = |action, words| keymap::of(action).map(|it| KeyHint::new(it.label, words));
@@ -165,7 +165,7 @@ fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
             named(Action::OlderPicture, "older, newer")
         };
         urgent.extend(both);
-        // All else is about the newest one.
+        // All other keys concern the newest render.
         return (urgent, KeyHint::of(Action::PictureAlone).into_iter().collect());
     }
     if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
@@ -175,7 +175,7 @@ fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
         urgent.extend(named(Action::CloseUp, "back"));
     }
     if state.request.first_section.is_some() {
-        let first = named(Action::RectangleFirst, "rectangle first");
+        let first = named(Action::RectangleFirst, "region first");
         urgent.extend(first.map(|hint| KeyHint { tone: Tone::Strong, ..hint }));
     }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
@@ -195,7 +195,7 @@ fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let has_picture = state.display.kind != PreviewKind::None;
     let is_shown = |it: &&Binding| it.action != Action::PictureAlone || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
-    // Another hint has it above, with what it takes back.
+    // Another hint above shows the key with what it resets.
     let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
     let others = KEYMAP
@@ -208,7 +208,7 @@ fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     (urgent, first.into_iter().chain(others).collect())
 }
 
-/// Keys of the list of views, or the letters typed of a name.
+/// Keys of the list of views, or the search text.
 fn of_views(views: &ViewList) -> Vec<KeyHint> {
     match &views.name {
         Some(name) => vec![KeyHint { tone: Tone::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
@@ -218,7 +218,7 @@ fn of_views(views: &ViewList) -> Vec<KeyHint> {
     }
 }
 
-/// These have their own places in the line.
+/// Actions that have their own place in the line.
 const ELSEWHERE: [Action; 8] = [
     Action::Quit,
     Action::ToggleHelp,
@@ -232,10 +232,10 @@ const ELSEWHERE: [Action; 8] = [
 
 fn going_on(hint: KeyHint, state: &State) -> KeyHint {
     let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
-    if is_pause && state.work.paused { KeyHint::new(hint.key, "go on") } else { hint }
+    if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
-/// Errors and warnings that are not in sight.
+/// Errors and warnings in a closed pane.
 fn unseen(state: &State) -> Option<KeyHint> {
     let key = keymap::of(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {

@@ -1,7 +1,7 @@
-//! The layout of the screen: the picture first.
+//! Layout of the screen.
 //!
-//! The places follow from the window, the shape of the picture and `tab` alone, never from what is going on: nothing
-//! jumps while a render runs.
+//! Positions depend only on the window, the shape of the image and `tab`, never on the state of the render,
+//! so nothing moves while it runs.
 
 use ratatui::layout::Rect;
 
@@ -9,50 +9,50 @@ use crate::pipeline::protocol::{PreviewSize, Stage};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// The areas of the screen; one that has no room is empty.
+/// Areas of the screen, empty if there is no room for them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Layout {
-    /// The state and the name; the only line where the picture is alone.
+    /// State and name; the only line with `tab`.
     pub header: Rect,
     pub preview: Rect,
-    /// Stages and results, at the side of the picture or below it; empty: they are folded into `under`.
+    /// Stages and results, beside or below the image. If empty, the status line shows them.
     pub panel: Rect,
-    /// The line under the picture: a message, else progress, else what it took.
+    /// The status line below the image: message, progress or result.
     pub under: Rect,
     /// The line of keys.
     pub keys: Rect,
-    /// Area of the errors: beside the picture, else over its lower part.
+    /// Area of the diagnostics: beside the image or over its lower part.
     pub pane: Rect,
 }
 
-/// The block of the state has this many columns, so that the name beside it stands still.
+/// Columns of the state block, fixed so that the name beside it does not move.
 pub(super) const BLOCK: usize = 13;
-/// Fewer rows than this hold one line of words beside the picture.
+/// Windows with fewer rows have one line of text.
 const TWO_LINES: u16 = 6;
-/// Fewer rows than this hold two.
+/// Windows with fewer rows have two lines of text.
 const THREE_LINES: u16 = 14;
-/// Columns that a stage with its time and the change of it needs.
+/// Columns of a stage with its time and change.
 const SIDE_WIDTH: u16 = 23;
-/// The same, and the space to the next one.
+/// Columns of a stage including the gap to the next one.
 pub(super) const ENTRY_WIDTH: u16 = 26;
-/// A panel at the side has room for half of the stages at least.
+/// Minimum rows of a panel beside the image: half of the stages.
 const SIDE_HEIGHT: u16 = 4;
-/// Least share of its cells that the picture keeps beside a panel; with less there is no panel.
+/// Minimum share of its cells that the image keeps beside a panel; otherwise there is no panel.
 const KEPT: f32 = 0.9;
-/// A panel from one of these sizes on holds errors as well: what is narrow has to be high.
+/// Minimum sizes of a panel that also shows diagnostics: narrow panels must be high.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];
-/// Rows of errors over the picture, if there are so many.
+/// Maximum rows of diagnostics over the image.
 const PANE_HEIGHT: u16 = 12;
 
 impl Layout {
-    /// For the state's window and picture.
+    /// The layout for the state's window and image.
     pub(crate) fn of(state: &State) -> Self {
         let shape = state.request.aspect() * state.display.window.cell_aspect;
         let shape = (state.display.kind != PreviewKind::None).then_some(shape);
         Self::new(state.display.window.columns, state.display.window.rows, shape, state.picture.is_alone)
     }
 
-    /// The preview that the window has room for: a box of square pixels, as many in the width of a cell as are drawn.
+    /// The size of the preview that fits the window, in square pixels.
     pub(crate) fn preview_size(state: &State) -> Option<PreviewSize> {
         let area = Self::of(state).preview;
         let across = state.display.pixels_across();
@@ -65,7 +65,7 @@ impl Layout {
         })
     }
 
-    /// `shape`: columns of the picture over its rows. `None` if no picture is shown.
+    /// `shape` is the aspect ratio of the image in cells. `None` if no image is shown.
     fn new(columns: u16, rows: u16, shape: Option<f32>, is_alone: bool) -> Self {
         let mut layout = Self::default();
         let mut rest = Rect::new(0, 0, columns, rows);
@@ -89,7 +89,8 @@ impl Layout {
     }
 }
 
-/// The picture and the panel: where the picture gets most, or without a panel where that takes too much of it.
+/// Divides the room between image and panel so that the image is largest, or leaves out the panel if it takes
+/// too much.
 fn divided(rest: Rect, shape: f32) -> (Rect, Rect) {
     let cells = |area| {
         let (width, height) = fit(area, shape);
@@ -110,7 +111,7 @@ fn beside(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
 
 fn below(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let columns = usize::from(rest.width / ENTRY_WIDTH);
-    // The stages, and a line of results.
+    // The stages, and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);
     let room = Rect { height: rest.height.checked_sub(rows)?, ..rest };
     let (_, height) = fit(room, shape);
@@ -118,7 +119,7 @@ fn below(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     (columns > 0).then_some((Rect { height, ..rest }, panel))
 }
 
-/// Columns and rows of the largest picture of this shape in an area.
+/// Columns and rows of the largest image of this shape in an area.
 fn fit(area: Rect, shape: f32) -> (u16, u16) {
     let rows = (f32::from(area.width) / shape).ceil();
     if rows <= f32::from(area.height) {
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn the_panel_is_where_the_picture_gets_most() {
+    fn panel_is_where_the_image_is_largest() {
         let four_by_three = layout(80, 24, 4.0 / 3.0);
         assert_eq!(four_by_three.preview, Rect::new(0, 1, 56, 21));
         assert_eq!(four_by_three.panel, Rect::new(57, 1, 23, 21));
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_lie_beside_the_picture_where_there_is_room() {
+    fn diagnostics_are_beside_the_image_if_possible() {
         let square = layout(120, 40, 1.0);
         assert_eq!(square.pane, square.panel);
         let tall = layout(80, 60, 4.0 / 3.0);
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn small_windows_give_up_lines_of_words() {
+    fn small_windows_have_fewer_text_lines() {
         let lines = |rows| {
             let layout = layout(40, rows, 4.0 / 3.0);
             [layout.header, layout.under, layout.keys, layout.preview].map(|area| area.height)
@@ -192,19 +193,15 @@ mod tests {
     }
 
     #[test]
-    fn alone_the_picture_has_all_but_one_line() {
+    fn tab_leaves_only_the_header() {
         let alone = Layout::new(80, 24, Some(2.0), true);
         assert_eq!((alone.preview, alone.header), (Rect::new(0, 0, 80, 23), Rect::new(0, 23, 80, 1)));
         let none = Layout::new(80, 24, None, true);
-        assert_eq!(
-            none.panel,
-            Rect::new(0, 1, 80, 21),
-            "where no picture is shown there is nothing to be alone"
-        );
+        assert_eq!(none.panel, Rect::new(0, 1, 80, 21), "without an image, tab changes nothing");
     }
 
     #[test]
-    fn areas_lie_in_the_window_and_do_not_overlap() {
+    fn areas_are_in_the_window_and_disjoint() {
         let shapes = [None, Some(0.1), Some(1.0), Some(2.7), Some(3.6), Some(40.0)];
         for (columns, rows) in (0..130).flat_map(|columns| (0..60).map(move |rows| (columns, rows))) {
             for (shape, is_alone) in shapes.into_iter().flat_map(|shape| [(shape, false), (shape, true)]) {

@@ -1,4 +1,4 @@
-//! Marks over the picture: the crosshair while a place is to be chosen, and the corners of the section that is rendered first.
+//! Marks over the image: the crosshair, and the corners of the region that renders first.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -8,7 +8,7 @@ use crate::pipeline::protocol::{Section, Spot};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
-/// Over a picture in these cells.
+/// Draws the marks over an image in these cells.
 pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     let mut mark = |spot: Spot, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
@@ -21,7 +21,7 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     if let Some(Section { left, top, width, height }) =
         state.request.first_section.filter(|_| is_marked(state))
     {
-        // A mark stands in the last cell of what it ends.
+        // The marks are inside the region.
         let (right, bottom) = (left + width * 0.999, top + height * 0.999);
         mark(Spot { x: left, y: top }, ["┌", "+"]);
         mark(Spot { x: right, y: top }, ["┐", "+"]);
@@ -36,12 +36,12 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// The rectangle is marked while it matters.
+/// Whether the region is marked: while it is dragged or rendered.
 fn is_marked(state: &State) -> bool {
     state.selection.is_marking || state.work.is_running()
 }
 
-/// The cell of a place of the picture, if that is in sight.
+/// The cell of a position in the image, if it is visible.
 fn cell_of(state: &State, spot: Spot, cells: Rect) -> Option<(u16, u16)> {
     let section = state.picture.shown.as_ref().and_then(|shown| shown.section);
     let Section { left, top, width, height } =

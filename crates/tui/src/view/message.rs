@@ -1,6 +1,6 @@
-//! The message to the user, and what was found at a place. Under the image, a message shares the line with progress or results;
-//! where it is too long for that, it covers the last rows of the image. Without such a line it takes the line of keys, or the first
-//! one.
+//! Messages and inspected values. A message shares the status line with progress or results. If it is too
+//! long for that, it covers the last rows of the image. Without a status line, it takes the line of keys or
+//! the header.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -12,16 +12,16 @@ use super::text::{Tone, columns, put, rest, row, wrapped};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
-/// Rows that a panel needs to hold what was found at a place.
+/// Rows that a panel needs for the inspected values.
 const FACTS: u16 = 10;
-/// Columns between a message and what shares its line.
+/// Columns between a message and the rest of the status line.
 const GAP: u16 = 2;
 
-/// Place of a message.
+/// Where a message is shown.
 enum MessagePosition {
     /// In one line.
     Line(Rect),
-    /// Over the last rows of these.
+    /// Over the last rows of this area.
     Over(Rect),
 }
 
@@ -40,19 +40,19 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = Rect { y: room.bottom() - height, height, ..room };
     Clear.render(area.intersection(buffer.area), buffer);
     for (index, line) in (0..height).zip(&lines) {
-        // What there is no row for is cut with a mark.
+        // Lines that do not fit are cut with an ellipsis.
         let is_cut = index + 1 == height && lines.len() > usize::from(height);
         let rest = if is_cut { lines[usize::from(index)..].join(" ") } else { line.clone() };
         put(buffer, row(area, index), &[(&rest, tone)], state.display.depth);
     }
 }
 
-/// Whether a message takes a line from whatever else is shown there. The line under the image is shared instead.
+/// Whether a message replaces a whole line. The status line is shared instead.
 pub(super) fn is_said(state: &State, layout: &Layout) -> bool {
     words(state, layout).is_some()
 }
 
-/// The part of the line under the image that a message leaves.
+/// The part of the status line that a message leaves.
 pub(super) fn left_under(state: &State, layout: &Layout) -> Rect {
     let spot = words(state, layout).map(|(words, _)| spot(state, layout, &words));
     let used = match spot {
@@ -63,14 +63,14 @@ pub(super) fn left_under(state: &State, layout: &Layout) -> Rect {
     rest(layout.under, used)
 }
 
-/// Whether it lies over the image.
+/// Whether the message covers the image.
 pub(super) fn is_over_picture(state: &State) -> bool {
     let layout = Layout::of(state);
     words(state, &layout)
         .is_some_and(|(words, _)| matches!(spot(state, &layout, &words), MessagePosition::Over(_)))
 }
 
-/// Whether the panel has room for what was found at a place.
+/// Whether the panel has room for the inspected values.
 pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
     let is_covered = state.overlays.diagnostics.open && layout.pane == layout.panel;
     layout.panel.height >= FACTS && !is_covered
@@ -82,7 +82,8 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
     let words = visible(&message.words).into_owned();
-    // The list of views lies where a long one would, and its keys where a short one would without a line of its own.
+    // The list of views takes the place of a long message, and its keys that of a short one without its own
+    // line.
     let has_place =
         !layout.under.is_empty() && matches!(spot(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {
@@ -96,7 +97,7 @@ fn spot(state: &State, layout: &Layout, words: &str) -> MessagePosition {
     let width = columns(words);
     let under = layout.under;
     if under.is_empty() {
-        // The block of the state stays in sight.
+        // Keep the state block visible.
         let beside = rest(layout.header, super::layout::BLOCK as u16 + 1);
         let line = if layout.keys.is_empty() { beside } else { layout.keys };
         let fits = width <= line.width && !line.is_empty();
@@ -118,9 +119,9 @@ fn spot(state: &State, layout: &Layout, words: &str) -> MessagePosition {
     MessagePosition::Over(if needed == 0 || above.is_empty() { room } else { above })
 }
 
-/// A line and the rows above it that a longer message may take.
+/// A line and the rows above it that a long message may cover.
 fn with_rows_above(layout: &Layout, line: Rect) -> Rect {
-    // The union with an empty area would reach to its corner.
+    // A union with an empty area would reach to its corner.
     let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());
     let rest = areas.reduce(Rect::union).unwrap_or(line);
     if line.y == layout.header.y {

@@ -1,4 +1,4 @@
-//! The state as cells.
+//! Drawing of the state into a cell buffer.
 
 mod curve;
 pub(super) mod diagnostics;
@@ -31,14 +31,14 @@ pub(super) fn state_word(state: &State) -> &'static str {
     header::word(state)
 }
 
-/// The picture of the strip at a cell, by its index among those that are kept.
+/// The render at a cell of the history strip, as an index into the history.
 pub(super) fn picture_at(state: &State, column: u16, row: u16) -> Option<usize> {
     let layout = Layout::of(state);
     let is_open = state.overlays.help.open || layout.panel.is_empty();
     (!is_open).then(|| panel::picture_at(state, layout.panel, (column, row))).flatten()
 }
 
-/// The whole screen, into a buffer of the window's size.
+/// Draws the whole screen.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     let layout = Layout::of(state);
     header::draw(state, &layout, buffer);
@@ -49,7 +49,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     if state.overlays.diagnostics.open {
         diagnostics::draw(state, layout.pane, buffer);
     }
-    // A long one goes on over whatever lies there.
+    // A long message covers everything below it.
     message::draw(state, &layout, buffer);
     if state.overlays.views.is_some() {
         views::draw(state, &layout, buffer);
@@ -57,7 +57,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> ViewExtras {
     if state.overlays.help.open {
         help::draw(state, buffer);
     }
-    // Text that lies over the rest waits for nothing, and is no link.
+    // Covered text has no links and is not delayed.
     let is_covered =
         state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
     if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {

@@ -1,4 +1,4 @@
-//! The panel beside or below the picture: stages and loading assets while they are at work, then what came out.
+//! The panel beside or below the image: stages and loading assets while they run, then the results.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -15,12 +15,12 @@ use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, AssetBar, State};
 
-/// Columns of a bar.
+/// Columns of a progress bar.
 const BAR: u16 = 8;
-/// Columns of what a result is.
+/// Columns of a result's label.
 const LABEL: usize = 8;
 
-/// In as many columns as there have to be and can be; what does not fit is left out at the end.
+/// Draws the panel in as many columns as needed and possible. Lines that do not fit are left out.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras {
     if area.is_empty() {
         return ViewExtras::default();
@@ -41,13 +41,13 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
     drawn
 }
 
-/// The picture of the strip at a cell.
+/// The render of the history strip at a cell.
 pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
     let PanelLayout { lines, columns, room } = arranged(state, area);
     side_panel::picture_at(state, area, rows(&lines, columns, room), place)
 }
 
-/// Lines in a panel, the number of their columns, and the cells that these may take.
+/// Lines of the panel, the number of columns, and the cells available to them.
 struct PanelLayout {
     lines: Vec<StyledLine>,
     columns: u16,
@@ -71,20 +71,21 @@ fn arranged(state: &State, area: Rect) -> PanelLayout {
     PanelLayout { lines, columns, room }
 }
 
-/// Rows that lines take; all of them if there are several columns.
+/// Rows used by the lines: all rows if there are several columns.
 fn rows(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
     if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
-/// The lines of a panel of this width, the hint wrapped to a column. With the reasons of stages in full, or with what fits of them beside the stages.
+/// The lines of a panel of this width; hints are wrapped to a column. Reasons of stages are shown in full, or
+/// shortened to fit beside the stages.
 fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, Activity::Done);
     let mut lines = inspected(state, width);
-    // The stages and results are not those of an older picture.
+    // Stages and results belong to the newest render.
     if state.picture.history.is_open() {
         return lines;
     }
-    // The stages of a broken scene are of nothing that is to be seen.
+    // The stages of a broken scene have no visible result.
     if !is_done && !is_broken(state) {
         let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
@@ -93,12 +94,12 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<St
         lines.extend(results(state, column));
     }
     lines.extend(hint(state, column));
-    // Bars come and go: nothing is below them.
+    // Progress bars come and go, so they are last.
     lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     lines
 }
 
-/// Facts about a place.
+/// The inspected values.
 fn inspected(state: &State, width: u16) -> Vec<StyledLine> {
     let facts =
         state.selection.facts.iter().filter(|_| message::is_in_panel(state, &Layout::of(state))).flatten();
@@ -110,7 +111,7 @@ fn inspected(state: &State, width: u16) -> Vec<StyledLine> {
     lines
 }
 
-/// Whether the scene as it is now cannot be read.
+/// Whether the current scene is invalid.
 fn is_broken(state: &State) -> bool {
     let is_at_rest = match state.work.activity {
         Activity::Waiting | Activity::Broken => true,
@@ -130,7 +131,7 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// Results in this many columns: a label and a value in each line.
+/// The results, one label and value per line.
 fn results(state: &State, width: u16) -> Vec<StyledLine> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
@@ -157,44 +158,45 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
                 format!("{} to {}", samples.min, samples.max)
             },
         ));
-        lines.extend(report.image.error.map(|error| fact("noise", format!("{} in all", share(error)))));
+        lines.extend(report.image.error.map(|error| fact("noise", share(error))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
             let sign = if end(state) == Some(RenderEnd::Error) { " ✓" } else { "" };
-            fact("asked", format!("{} % a tile{sign}", f64::from((it.error * 1e4).round()) / 100.0))
+            fact("target", format!("{} % per tile{sign}", f64::from((it.error * 1e4).round()) / 100.0))
         }));
     }
     match end(state) {
-        Some(RenderEnd::Time) => lines.push(fact("ended by", "time".to_owned())),
-        Some(RenderEnd::Samples) => lines.push(fact("ended by", "samples".to_owned())),
+        Some(RenderEnd::Time) => lines.push(fact("stopped", "at time limit".to_owned())),
+        Some(RenderEnd::Samples) => lines.push(fact("stopped", "at max. samples".to_owned())),
         Some(RenderEnd::Error) | None => {}
     }
     lines.extend(status_line::seen(state).map(|words| vec![(words, Tone::Faint)]));
     lines
 }
 
-/// The first limit that a render met.
+/// The limit that ended a render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RenderEnd {
     Time,
     Samples,
-    /// Every tile has the `error` asked for.
+    /// The requested `error` was reached in every tile.
     Error,
 }
 
-/// The limit that ended the render. `None` if there is but one.
+/// The limit that ended the render. `None` if there is only one limit.
 fn end(state: &State) -> Option<RenderEnd> {
     let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
     let is_by_error = effective.error > 0.0;
     match () {
         () if !is_by_error && state.request.command_line.time_seconds.is_none() => None,
         () if !image.complete => Some(RenderEnd::Time),
-        // Tiles with as many samples as there may be are perhaps not there yet.
+        // Tiles with the maximum number of samples may not have reached the error.
         () if is_by_error && image.samples.max < effective.samples => Some(RenderEnd::Error),
         () => Some(RenderEnd::Samples),
     }
 }
 
-/// The hint for a user who has not saved yet, broken between words. A broken scene without an image has it in the line below.
+/// A hint for a user who has not saved yet, wrapped. For a broken scene without an image, the status line
+/// shows it.
 fn hint(state: &State, width: u16) -> Vec<StyledLine> {
     if is_broken(state) && state.picture.shown.is_none() {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! The picture in blocks or characters: the one place where pixels become cells.
+//! The preview in block or other characters: the only place where pixels become cells.
 
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
@@ -13,6 +13,7 @@ use crate::color::{ColorDepth, ColorMapper, XTERM};
 use crate::film::Picture;
 use crate::graphics::PixelPlacement;
 use crate::history::ShownImage;
+use crate::messages;
 use crate::mosaic::{Grid, fit};
 use crate::options::PreviewChoice;
 use crate::pipeline::protocol::Spot;
@@ -20,7 +21,7 @@ use crate::preview_kind::PreviewKind;
 use crate::rescale::rescaled;
 use crate::state::State;
 
-/// The picture of the state, or a word in its place.
+/// Draws the preview, or a word if there is none.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     match &state.picture.shown {
@@ -32,7 +33,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
             marks::draw(state, placed.cells, buffer);
         }
         None if state.overlays.problems.is_none() && area.height > 0 => {
-            let text = "no picture yet";
+            let text = messages::NO_IMAGE;
             let middle = Rect { y: area.y + area.height / 2, height: 1, ..area };
             let indent = area.width.saturating_sub(super::text::columns(text)) / 2;
             let line = Rect { x: middle.x + indent, width: middle.width - indent, ..middle };
@@ -42,7 +43,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
-/// A small picture beside the words.
+/// Draws a thumbnail.
 pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
     if !area.is_empty() {
@@ -52,7 +53,7 @@ pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &
     }
 }
 
-/// The place of the picture that a cell shows.
+/// The position in the image that a cell shows.
 pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::of(state).preview;
@@ -65,7 +66,7 @@ pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
     cells.contains((column, row).into()).then(spot)
 }
 
-/// Kind of preview when the picture has to be in cells.
+/// Kind of the preview when it must be drawn with cells.
 fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     match kind {
         PreviewKind::Pixels(_) => PreviewKind::of(PreviewChoice::Auto, depth),
@@ -73,7 +74,7 @@ fn in_cells(kind: PreviewKind, depth: ColorDepth) -> PreviewKind {
     }
 }
 
-/// Whether the picture is drawn in pixels: where nothing may lie over it.
+/// Whether the preview is drawn as pixels, which is only possible if nothing covers it.
 fn is_in_pixels(state: &State) -> bool {
     matches!(state.display.kind, PreviewKind::Pixels(_))
         && !state.overlays.help.open
@@ -82,7 +83,7 @@ fn is_in_pixels(state: &State) -> bool {
         && !message::is_over_picture(state)
 }
 
-/// Placement of the picture in pixels. `None` if it is drawn in cells.
+/// Placement of the preview in pixels. `None` if it is drawn with cells.
 pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     let shown = state.picture.shown.as_ref().filter(|_| is_in_pixels(state))?;
     let placed = PlacedImage::of(state, shown, area, state.display.kind);
@@ -90,12 +91,12 @@ pub(crate) fn placement(state: &State, area: Rect) -> Option<PixelPlacement> {
     (!cells.is_empty()).then_some(PixelPlacement { picture, cells, cell: state.display.window.cell_pixels })
 }
 
-/// Colors that show a picture.
+/// Color settings of a preview.
 #[derive(Clone, Copy)]
 pub(crate) struct PreviewColors<'a> {
     pub(crate) depth: ColorDepth,
     pub(crate) shades: &'a ColorMapper,
-    /// Whether the terminal's background is.
+    /// Whether the terminal's background is light.
     pub(crate) is_light: bool,
 }
 
@@ -105,14 +106,14 @@ impl<'a> PreviewColors<'a> {
     }
 }
 
-/// A picture as it is shown in these cells, of twice the height of their width, on a dark terminal with the colors of xterm.
+/// Draws an image into these cells for a dark terminal with xterm's colors and cells twice as high as wide.
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
     let shades = ColorMapper::new(depth, &XTERM);
     let inks = PreviewColors { depth, shades: &shades, is_light: false };
     shown_by(picture, choice, inks, (area, 2.0))
 }
 
-/// The same with these inks, where cells are of another aspect ratio.
+/// Draws an image with these color settings and cells of another aspect ratio.
 pub(crate) fn shown_by(
     picture: &Picture,
     choice: PreviewChoice,
@@ -125,7 +126,7 @@ pub(crate) fn shown_by(
     buffer
 }
 
-/// Columns and rows of a picture in half blocks or in characters, within those available.
+/// Size in cells of an image drawn with half blocks or characters, within the available cells.
 pub(crate) fn size_in_cells(
     picture: &Picture,
     depth: ColorDepth,
@@ -138,7 +139,7 @@ pub(crate) fn size_in_cells(
     (cells.width, cells.height)
 }
 
-/// Placement of a picture: its cells, and its pixels there.
+/// Placement of an image: its cells and its pixels in them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct PlacedImage {
     cells: Rect,
@@ -147,7 +148,7 @@ struct PlacedImage {
 }
 
 impl PlacedImage {
-    /// Placement of the state's picture: as large as there is room for, or pixel by pixel.
+    /// Placement of the current preview: as large as possible, or at actual pixels.
     fn of(state: &State, shown: &ShownImage, area: Rect, kind: PreviewKind) -> Self {
         let across = kind.grid().map_or(1, Grid::columns);
         let one_to_one = across as f32 / state.display.pixels_across() as f32;
@@ -155,8 +156,8 @@ impl PlacedImage {
         Self::fit(&shown.picture, area, kind, state.display.window.cell_aspect, most)
     }
 
-    /// The largest place in the middle of the area with the picture's aspect ratio. `cell_aspect` is the height
-    /// of a cell over its width, `most` the most parts of a cell that a pixel is wide.
+    /// The largest centered placement with the aspect ratio of the image. `cell_aspect` is the height of a
+    /// cell divided by its width; a pixel is at most `most` parts of a cell wide.
     fn fit(picture: &Picture, area: Rect, kind: PreviewKind, cell_aspect: f32, most: f32) -> Self {
         let (across, down) = kind.grid().map_or((1, 1), |grid| (grid.columns() as u16, grid.rows() as u16));
         let pixel_aspect = cell_aspect * f32::from(across) / f32::from(down);
@@ -166,7 +167,7 @@ impl PlacedImage {
         let whole = |length: f32, room: f32| (length * scale).round().clamp(room.min(1.0), room) as u16;
         let (width, height) = (whole(size.0, room.0), whole(size.1, room.1));
         let (columns, rows) = (width.div_ceil(across), height.div_ceil(down));
-        // Of several pixels in a cell, the last cells are whole.
+        // With several pixels per cell, round up to whole cells.
         let (width, height) = if across > 1 { (columns * across, rows * down) } else { (width, height) };
         let cells = Rect {
             x: area.x + (area.width - columns.min(area.width)) / 2,
@@ -200,7 +201,7 @@ impl PlacedImage {
     }
 }
 
-/// A picture of the size at which it is drawn.
+/// An image at the size at which it is drawn.
 struct ScaledImage<'a> {
     width: u32,
     height: u32,
@@ -214,7 +215,7 @@ impl ScaledImage<'_> {
     }
 }
 
-/// A cell in two colors.
+/// A cell with two colors.
 fn mosaic(
     scaled: &ScaledImage<'_>,
     grid: Grid,
@@ -227,7 +228,7 @@ fn mosaic(
     let parts: Vec<Option<[u8; 3]>> = (0..grid.columns() * grid.rows()).map(part).collect();
     let colors: Vec<[u8; 3]> = parts.iter().copied().flatten().collect();
     if colors.len() < parts.len() {
-        // The last row of cells has no picture below.
+        // The last row of cells may have no pixels in its lower half.
         let color = parts[0].map_or(Color::Reset, |rgb| shades.color(rgb, x, 2 * y));
         cell.set_symbol("▀").set_style(Style::new().fg(color).bg(Color::Reset));
         return;
@@ -276,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_of_the_size_asked_for_is_not_scaled() {
+    fn image_of_the_requested_size_is_not_scaled() {
         let placed = fit(50, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
         assert_eq!(placed, PlacedImage { cells: Rect::new(3, 1, 50, 20), width: 50, height: 40 });
         let narrow = fit(20, 40, (50, 20), PreviewKind::HalfBlock, 2.0);
@@ -286,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn the_aspect_is_kept_in_every_area() {
+    fn aspect_is_kept_in_every_area() {
         for (columns, rows) in [(80_u16, 24_u16), (51, 20), (150, 55), (200, 20), (30, 60)] {
             for (width, height) in [(640, 480), (100, 300), (1920, 1080), (64, 64)] {
                 for (kind, across, per_cell) in [
@@ -300,7 +301,7 @@ mod tests {
                         let placed = fit(width, height, (columns, rows), kind, aspect);
                         let shown_height = placed.height as f32 * aspect / per_cell;
                         let shown_width = placed.width as f32 / across;
-                        // Half a pixel of rounding on each side; where a cell has several, up to a cell.
+                        // Half a pixel of rounding per side; with several pixels per cell, up to a cell.
                         let is_fine = across > 1.0;
                         let (off_x, off_y) =
                             if is_fine { (1.0, aspect) } else { (0.5, 0.5 * aspect / per_cell) };
@@ -319,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn an_odd_last_row_leaves_the_lower_half_to_the_background() {
+    fn odd_last_row_shows_the_background() {
         let one = picture(2, 1, |_, _| [9, 8, 7]);
         let state = state(2, 3);
         let mut buffer = Buffer::empty(Rect::new(0, 0, 2, 3));
@@ -334,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_between_the_columns_of_a_cell_is_shown_by_quadrants() {
+    fn edges_within_a_cell_use_quadrants() {
         let sharp = picture(8, 8, |x, _| if x < 3 { [200, 20, 20] } else { [20, 20, 200] });
         let state = state(4, 2);
         for (kind, symbol) in

@@ -1,11 +1,11 @@
-//! The picture in characters: each as bright as its ink makes it.
+//! The preview in characters, whose ink approximates the brightness.
 
 use crate::film::Picture;
 use crate::math::Vec3;
 use crate::math::color::{linear_to_srgb, linear_to_srgb8, luminance, srgb_to_linear, srgb8_to_linear};
 
-/// Characters with the part of a cell that their ink covers, as measured on DejaVu Sans Mono; other fonts differ by a
-/// few percent of the most. All are punctuation, which tells them from words.
+/// Characters with the fraction of a cell that their ink covers, measured with DejaVu Sans Mono; other fonts
+/// differ by a few percent. All are punctuation, to distinguish them from text.
 const RAMP: [(char, f32); 15] = [
     (' ', 0.0),
     ('.', 0.027),
@@ -25,19 +25,20 @@ const RAMP: [(char, f32); 15] = [
 ];
 const MOST_INK: f32 = RAMP[RAMP.len() - 1].1;
 
-/// Mapping of brightness to ink.
+/// Mapping from brightness to ink.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Ramp {
     /// The values shown as black and as white, in sRGB.
     low: f32,
     high: f32,
-    /// Whether the terminal's background is lighter than its foreground.
+    /// Whether the background is lighter than the foreground.
     is_light: bool,
 }
 
 impl Ramp {
-    /// For a picture: from its darkest to its brightest, but for a thirtieth of it at each end: lamps. In steps, so that noise does
-    /// not turn all the characters, and no more than stretched by four.
+    /// The ramp for an image: from its darkest to its brightest values, ignoring a thirtieth of the pixels at
+    /// each end. The limits are quantized so that noise does not change all characters, and contrast is
+    /// increased at most four times.
     pub(super) fn of(picture: &Picture, is_light: bool) -> Self {
         const STEPS: f32 = 16.0;
         const LEAST: f32 = 0.25;
@@ -54,17 +55,18 @@ impl Ramp {
         Self { low: low.max(0.0), high, is_light }
     }
 
-    /// Brightness, in sRGB, as far as it is shown.
+    /// Brightness in sRGB, mapped to the range of the ramp.
     fn stretched(self, brightness: f32) -> f32 {
         ((brightness - self.low) / (self.high - self.low).max(1e-3)).clamp(0.0, 1.0)
     }
 
-    /// The character for a color, if there is only one ink.
+    /// The character for a color on a monochrome terminal.
     pub(super) fn glyph(self, rgb: [u8; 3]) -> char {
         self.nearest(self.stretched(linear_to_srgb(luminance(srgb8_to_linear(rgb)).clamp(0.0, 1.0))))
     }
 
-    /// The character for a color and its ink: as saturated as that allows, so that much of it is covered.
+    /// The character for a color and its ink, which is as saturated as possible so that the character covers
+    /// as much as possible.
     pub(super) fn tinted(self, rgb: [u8; 3]) -> (char, [u8; 3]) {
         let linear = srgb8_to_linear(rgb);
         if self.is_light {
@@ -77,12 +79,12 @@ impl Ramp {
         }
     }
 
-    /// The character that comes nearest to a brightness in sRGB. All of the background is one end, as much of the
-    /// foreground as a character has the other.
+    /// The character closest to a brightness in sRGB. One end is the bare background, the other the densest
+    /// character.
     fn nearest(self, brightness: f32) -> char {
         let off = |ink: f32| {
             let covered = ink / MOST_INK;
-            // A little less than white is about as much darker as it is less.
+            // Near white, the loss of brightness is about proportional to the ink.
             let seen = if self.is_light { 1.0 - covered } else { linear_to_srgb(covered) };
             (seen - brightness).abs()
         };
@@ -90,7 +92,7 @@ impl Ramp {
     }
 }
 
-/// The first of these levels that has more than so many pixels with those before.
+/// The first level at which more than `beyond` pixels have been counted.
 fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: usize) -> f32 {
     let mut seen = 0;
     let level = levels.find(|level| {
@@ -100,7 +102,7 @@ fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: u
     level.unwrap_or_default() as f32 / 255.0
 }
 
-/// The color in 5 bits of a channel: what noise changes is not drawn again.
+/// Quantizes a color to 5 bits per channel, so that noise causes no redraw.
 fn coarse(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(|channel| {
         let level = linear_to_srgb8(channel) >> 3;
@@ -108,7 +110,7 @@ fn coarse(linear: Vec3) -> [u8; 3] {
     })
 }
 
-/// Whether a background is light: nearer to white than to black as it looks.
+/// Whether a background is perceptually closer to white than to black.
 pub(crate) fn is_light(rgb: [u8; 3]) -> bool {
     luminance(srgb8_to_linear(rgb)) > srgb_to_linear(0.5)
 }
@@ -120,11 +122,11 @@ mod tests {
     const FULL: Ramp = Ramp { low: 0.0, high: 1.0, is_light: false };
 
     fn rank(symbol: char) -> usize {
-        RAMP.iter().position(|(other, _)| *other == symbol).expect("one of the ramp")
+        RAMP.iter().position(|(other, _)| *other == symbol).expect("a ramp character")
     }
 
     #[test]
-    fn more_light_is_more_ink_on_black_and_less_on_white() {
+    fn ink_follows_brightness_and_background() {
         let light = Ramp { is_light: true, ..FULL };
         assert_eq!((FULL.glyph([0; 3]), FULL.glyph([255; 3])), (' ', '@'));
         assert_eq!((light.glyph([0; 3]), light.glyph([255; 3])), ('@', ' '));
@@ -137,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dull_picture_is_stretched_and_noise_does_not_move_the_ends() {
+    fn low_contrast_is_stretched_and_stable() {
         let dull = |noise: u8| {
             let pixels = (0..1000).map(|i| [80 + (i % 60) as u8 + noise * (i % 2) as u8; 3]).collect();
             Picture { width: 100, height: 10, pixels }
@@ -150,11 +152,11 @@ mod tests {
     }
 
     #[test]
-    fn ink_has_the_hue_and_the_character_the_rest() {
+    fn ink_carries_hue_and_character_the_rest() {
         assert_eq!(FULL.tinted([128, 0, 0]).1, [255, 0, 0]);
         assert!(rank(FULL.tinted([128, 0, 0]).0) < rank(FULL.tinted([255, 0, 0]).0));
         let light = Ramp { is_light: true, ..FULL };
-        // Pale red is little ink of pure red.
+        // Pale red is sparse pure red.
         let (symbol, ink) = light.tinted([255, 200, 200]);
         assert_eq!(ink, [255, 0, 0]);
         assert!(rank(symbol) < 11 && rank(symbol) > 0, "{symbol}");

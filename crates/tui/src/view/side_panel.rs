@@ -1,4 +1,5 @@
-//! The room that stages and results leave in the panel of a wide window: the curve of noise and the last pictures.
+//! The noise curve and the history strip, in the room that stages and results leave in the panel of a wide
+//! window.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -7,14 +8,14 @@ use super::layout::ENTRY_WIDTH;
 use super::{curve, diagnostics, strip};
 use crate::state::{Activity, State};
 
-/// Columns of a window from which on there is such room.
+/// Minimum window width for them.
 const WIDE: u16 = 120;
-/// Columns of the lines in a panel that is divided: as many as a stage with its reason takes.
+/// Columns of the lines in a divided panel, enough for a stage with its reason.
 const COLUMN: u16 = 44;
-/// Columns of a panel that is divided side by side.
+/// Minimum width of a panel that is divided side by side.
 const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
-/// Columns that the lines of a panel may take: the rest is spare.
+/// Columns available to the lines of the panel; the rest is free.
 pub(super) fn columns_of_lines(state: &State, panel: Rect) -> u16 {
     let is_divided = is_wide(state) && panel.width >= DIVIDED;
     if is_divided { COLUMN } else { panel.width }
@@ -24,7 +25,7 @@ fn is_wide(state: &State) -> bool {
     state.display.window.columns >= WIDE
 }
 
-/// The room beside or below the lines of a panel, which take so many rows.
+/// The free area beside or below the lines.
 fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
@@ -33,11 +34,11 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     let area = if used < panel.width {
         super::text::rest(panel, used + 2)
     } else {
-        // A line stays free above.
+        // One row stays empty above.
         let used = (lines + u16::from(lines > 0)).min(panel.height);
         Rect { y: panel.y + used, height: panel.height - used, ..panel }
     };
-    // What lies over it leaves the rows above.
+    // Stay above the pane of diagnostics.
     let over = diagnostics::covered(state);
     if over.intersects(area) {
         return Rect { height: over.y.saturating_sub(area.y), ..area };
@@ -45,22 +46,23 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     area
 }
 
-/// Draws what there is room for. Returns the cells that it takes.
+/// Draws what fits. Returns the cells used.
 pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) -> Rect {
     let (curve, strip) = divided(state, panel, lines);
     curve::draw(state, curve, buffer);
     strip::draw(state, strip, buffer);
-    // The union with an empty area would reach to its corner.
+    // A union with an empty area would reach to its corner.
     [curve, strip].into_iter().filter(|area| !area.is_empty()).reduce(Rect::union).unwrap_or_default()
 }
 
-/// The picture of the strip at a cell.
+/// The render of the history strip at a cell.
 pub(super) fn picture_at(state: &State, panel: Rect, lines: u16, place: (u16, u16)) -> Option<usize> {
     let (_, strip) = divided(state, panel, lines);
     strip::at(state, strip, place)
 }
 
-/// Room of the curve and of the strip. The strip is at the bottom, so that it keeps its place while results change above it.
+/// Divides the area between curve and strip. The strip is at the bottom so that it does not move when the
+/// results change.
 fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = area(state, panel, lines);
     let is_over = state.work.activity == Activity::Done && !state.picture.history.is_open();
@@ -74,7 +76,7 @@ fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     if !wants_curve(area) {
         return (Rect::ZERO, area);
     }
-    // The curve takes its rows, then the strip what is left; with too few left, the strip comes first.
+    // The curve is first and the strip gets the rest, unless the strip would not fit.
     let rows = curve::rows(state, area).unwrap_or(0);
     let rest = area.height.saturating_sub(rows + 1);
     let below = Rect { y: area.bottom() - rest, height: rest, ..area };

@@ -1,4 +1,4 @@
-//! The stages: a line for each while they are at work, one for all of them when they are done.
+//! The stages: one line each while they run, a single line afterwards.
 
 use super::text::{Tone, columns, counted, delta, seconds, shortened, wrapped};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
@@ -8,14 +8,14 @@ use crate::state::{AssetBar, State};
 /// Pieces of text with their tones.
 pub(super) type StyledLine = Vec<(String, Tone)>;
 
-/// Stages that took less of the whole time than this are left out of the one line.
+/// Stages that took less than this fraction of the total time are left out of the single line.
 const SMALL: f64 = 0.02;
-/// Columns of a name and a time with the gap between them.
+/// Columns of a name and a time, including the gap.
 const TIME_ENDS: u16 = 16;
-/// Fewer columns of a reason say nothing.
+/// Minimum columns of a reason.
 const LEAST_WHY: u16 = 12;
 
-/// Sign, name, time, its change, and the reason; in lines of its own if there is no room beside them.
+/// Symbol, name, time, change and reason. The reason gets its own lines if there is no room beside them.
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = figures(state, stage, room);
     let why = why(state, stage);
@@ -31,7 +31,7 @@ pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     std::iter::once(line).chain(below).collect()
 }
 
-/// The same in one line, as far as there is room.
+/// Symbol, name, time, change and as much of the reason as fits in one line.
 pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = figures(state, stage, room);
     let (why, room) = (why(state, stage), beside(&line, room));
@@ -55,7 +55,7 @@ fn why(state: &State, stage: Stage) -> String {
     visible(report.map_or("", |report| report.why.as_str())).into_owned()
 }
 
-/// Sign, name, time, and its change if there is room.
+/// Symbol, name, time and, if there is room, change.
 fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.work.is_running();
@@ -72,7 +72,7 @@ fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
         let (name, gap) = (stage.name(), usize::from(gap));
         vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
     };
-    // The time ends in the same column everywhere, unless the change needs the gap.
+    // Times are aligned unless the change needs the gap.
     let used = columns(stage.name()) + columns(&time);
     let usual = TIME_ENDS.saturating_sub(used).max(1);
     let change = report.map_or(String::new(), |report| change(state, report));
@@ -86,13 +86,13 @@ fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
     line
 }
 
-/// Bold for what an edit made again.
+/// Bold for stages that an edit caused to run.
 fn weight(state: &State, report: Option<&StageReport>) -> Tone {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }
 }
 
-/// Against the last time that the stage was at work.
+/// Difference to the previous time of the stage.
 fn change(state: &State, report: &StageReport) -> String {
     match report.status {
         Status::Done => {
@@ -102,8 +102,8 @@ fn change(state: &State, report: &StageReport) -> String {
     }
 }
 
-/// The stages that took a noticeable share of the time, and how many were reused; in short or only the longest one if there is no
-/// room. Empty if not even that fits.
+/// The stages that took a significant part of the time and the number of cached ones, shortened to fit. Empty
+/// if not even the longest stage fits.
 pub(super) fn in_one_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
@@ -138,12 +138,12 @@ fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) ->
     if reused > 0 {
         let comma = if line.is_empty() { "" } else { ", " };
         let stages = if is_long { counted(reused, "stage") } else { reused.to_string() };
-        line.push((format!("{comma}{stages} reused"), Tone::Faint));
+        line.push((format!("{comma}{stages} cached"), Tone::Faint));
     }
     line
 }
 
-/// The stage that is at work.
+/// The running stage.
 pub(super) fn at_work(state: &State) -> Option<&'static str> {
     let mut stages = state.work.stages.iter().flatten();
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())

@@ -1,4 +1,5 @@
-//! The line under the image: progress while a render runs, then its stages and files. A message takes the left part of it.
+//! The status line below the image: progress while a render runs, then stages and files. Messages take its
+//! left part.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -10,6 +11,7 @@ use super::text::{
     Tone, about, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share,
 };
 use crate::exit_summary;
+use crate::messages;
 use crate::pipeline::protocol::{NoiseProgress, OwnState, RenderProgress};
 use crate::pipeline::words::samples_so_far;
 use crate::preview_kind::PreviewKind;
@@ -17,13 +19,13 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{Activity, OwnImage, State, WrittenFile};
 
-/// The hint in a narrow window.
-const SHORT_HINT: &str = "save it to render again";
-const SHORT_HINT_OF_MODEL: &str = "rendered again on changes";
-/// A shorter bar says nothing.
+/// Hints for narrow windows.
+const SHORT_HINT: &str = "save it to re-render";
+const SHORT_HINT_OF_MODEL: &str = "re-renders on changes";
+/// Minimum columns of a progress bar.
 const LEAST_BAR: u16 = 6;
 
-/// Draws it in the part of the line that a message leaves.
+/// Draws the status line in the part that a message leaves.
 pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     match content(state) {
         StatusContent::Nothing => {}
@@ -35,7 +37,7 @@ pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buff
     }
 }
 
-/// Content of the line.
+/// Content of the status line.
 enum StatusContent {
     Nothing,
     ProgressBar,
@@ -44,7 +46,7 @@ enum StatusContent {
 }
 
 fn content(state: &State) -> StatusContent {
-    // What the newest picture took says nothing of an older one.
+    // The results belong to the newest render.
     if state.picture.history.is_open() && !state.work.is_running() {
         return StatusContent::Nothing;
     }
@@ -53,18 +55,16 @@ fn content(state: &State) -> StatusContent {
         Activity::Done => StatusContent::Summary,
         Activity::Waiting | Activity::Cancelled => StatusContent::Nothing,
         Activity::Broken if let Some(progress) = goes_on(state) => {
-            StatusContent::Words(format!("the last good scene goes on: {} %", percent(progress.fraction)))
+            StatusContent::Words(messages::last_good_renders(percent(progress.fraction)))
         }
         Activity::Broken if state.picture.shown.is_some() => {
-            let until =
-                if state.overlays.is_scene_missing() { "the file is back" } else { "the errors are fixed" };
-            StatusContent::Words(format!("the last good picture stays until {until}"))
+            StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
         }
         Activity::Broken => StatusContent::Words(hint(state)),
     }
 }
 
-/// Columns that a message leaves for the rest of the line.
+/// Columns of the status line that a message must leave.
 pub(super) fn least_columns(state: &State, layout: &Layout) -> u16 {
     match content(state) {
         StatusContent::Nothing => 0,
@@ -76,13 +76,13 @@ pub(super) fn least_columns(state: &State, layout: &Layout) -> u16 {
     }
 }
 
-/// Progress of the last good scene, whose render goes on while the file is broken.
+/// Progress of the last valid scene, which continues to render while the file is broken.
 pub(crate) fn goes_on(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, Activity::Broken | Activity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Fraction and words of the loading asset or of the render.
+/// Fraction and text for the loading asset or the render.
 fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_for(state.now).map_or(String::new(), running);
     match (&state.work.progress, state.work.assets.last()) {
@@ -90,7 +90,7 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
             let samples = if progress.is_total_fixed {
                 format!("{}/{} samples", samples_so_far(progress), progress.total_samples)
             } else {
-                // The total is a guess.
+                // The total is only estimated.
                 format!("about {:.0} samples per pixel", progress.mean_samples.floor())
             };
             (progress.fraction, format!("{samples} · {time}"))
@@ -102,13 +102,13 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     }
 }
 
-/// Draws the bar of the loading asset or of the render.
+/// Draws the progress bar of the loading asset or the render.
 fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     let name = at_work(state).unwrap_or_default();
     let (fraction, words) = bar_words(state, layout);
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
-    // A pause ends when somebody wants it to.
+    // The end of a pause cannot be predicted.
     let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= columns(noise) + 3 + LEAST_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
@@ -125,17 +125,17 @@ fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     put(buffer, area, &pieces, state.display.depth);
 }
 
-/// `noise 2.1 %, 1 % in about 14 s`, or shorter: called noise, as what is free of it may still be far from right.
+/// `noise 2.1 % → 1 % in about 14 s` or shorter. Called noise because a noise-free image may still be biased.
 fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     let now = format!("noise {}", share(noise.now));
-    let next = noise.next.map(|(level, seconds)| format!("{now}, {} in {}", share(level), about(seconds)));
+    let next = noise.next.map(|(level, seconds)| format!("{now} → {} in {}", share(level), about(seconds)));
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
-/// Draws the stages in one line, and the other facts that the panel does not show.
+/// Draws the stages in one line, and facts that the panel does not show.
 fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     let of_files = file_pieces(state, layout);
-    // The files come first where there is not room for everything.
+    // Files take precedence if there is not enough room.
     let room = area.width.saturating_sub(least_columns(state, layout));
     let mut pieces = stages::in_one_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
@@ -176,7 +176,7 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
     put_right(buffer, free, &seen, Tone::Faint, state.display.depth);
 }
 
-/// Name and size of each written file, if the panel does not list them.
+/// Name and size of each written file, unless the panel lists them.
 fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
     let pieces = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -186,9 +186,9 @@ fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
     files(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
 }
 
-/// The files that hold the picture at hand.
+/// The files that contain the current image.
 pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
-    // The scene's own image is in the files of the previous request if it has not changed.
+    // If the scene's own image has not changed, the previous request wrote it.
     let is_own = state.request.is_own();
     let of_any_request = is_own && state.saving.unwritten.is_none();
     state
@@ -200,42 +200,42 @@ pub(super) fn files(state: &State) -> impl Iterator<Item = &WrittenFile> {
         .filter(move |written| of_any_request || written.generation == state.request.generation)
 }
 
-/// Words about a picture that only a key writes and that no key has written, and about the scene's own image meanwhile.
+/// Lines about an unsaved image, and about the state of the scene's own image.
 pub(crate) fn not_saved(state: &State) -> Vec<String> {
     if state.request.is_own() || files(state).next().is_some() {
         return Vec::new();
     }
-    let mut words = vec!["not saved · w saves it".to_owned()];
+    let mut words = vec![messages::NOT_SAVED.to_owned()];
     if let Some(name) = exit_summary::image_name(state) {
         let OwnImage { state: own, fraction } = state.saving.own;
         match own {
             OwnState::Written => {}
             OwnState::Begun { .. } if state.saving.written.iter().any(|written| written.shows.is_some()) => {}
             OwnState::Begun { .. } => {
-                words.push(format!("{name} at {} %: 0 continues it", percent(fraction)));
+                words.push(messages::own_unfinished(&name, percent(fraction)));
             }
             OwnState::NotBegun if state.saving.written.is_empty() => {}
-            OwnState::NotBegun => words.push(format!("{name} is older than your last edit: 0 renders it")),
+            OwnState::NotBegun => words.push(messages::own_outdated(&name)),
         }
     }
     words
 }
 
-/// Words about each written file that another program has changed.
+/// A line about each written file that another program has changed.
 pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
     let words = |written: &WrittenFile| {
         let name = visible(&written.path.to_string_lossy()).into_owned();
-        written.lost.map(|lost| format!("{name} {} · w writes it again", lost.words()))
+        written.lost.map(|lost| messages::output_changed(&name, lost.words()))
     };
     state.saving.written.iter().filter_map(words)
 }
 
-/// From the save to the first changed cell.
+/// Time from the save to the first changed cell.
 pub(super) fn seen(state: &State) -> Option<String> {
-    state.saving.first_change.map(|time| format!("saved → seen {}", duration(time)))
+    state.saving.first_change.map(|time| format!("on screen {} after save", duration(time)))
 }
 
-/// A hint for a person who has not saved yet, unless there is nothing to save.
+/// A hint for a user who has not saved yet, unless there is nothing to save.
 pub(super) fn hint(state: &State) -> String {
     if state.saving.edits > 0 || is_unreadable(state) {
         return String::new();
@@ -243,15 +243,14 @@ pub(super) fn hint(state: &State) -> String {
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = visible(&name);
-    // A program writes a model, which the user does not save.
+    // Models are written by a program, not saved by the user.
     if is_mesh(&state.request.scene) {
-        return format!("rendered again when {name} changes");
+        return messages::renders_on_changes(&name);
     }
-    let again = if state.picture.shown.is_some() || state.work.renders > 0 { " again" } else { "" };
-    format!("save {name} to render{again}")
+    messages::save_to_render(&name, state.picture.shown.is_some() || state.work.renders > 0)
 }
 
-/// Whether what is wrong with the scene is no text in it: it is a folder, or it is not there.
+/// Whether the scene cannot be read at all, for example because it does not exist.
 fn is_unreadable(state: &State) -> bool {
     let overlays = &state.overlays;
     let found = overlays.problems.as_ref().filter(|problems| problems.work.is_none());
@@ -259,11 +258,11 @@ fn is_unreadable(state: &State) -> bool {
     diagnostics.is_some_and(|all| all.iter().all(|one| one.place.is_none()))
 }
 
-/// Cost of the last picture on its way: the bytes since its render began, and the terminal's time to answer; then the bytes alone.
+/// Cost of the last preview: bytes with the round trip, or bytes only.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let size = format!("{} kB sent", frame.bytes.div_ceil(1000));
     let time = frame.round_trip.map(|time| time.as_millis().max(1));
-    let both = time.map(|time| format!("{size}, answered in {time} ms"));
+    let both = time.map(|time| format!("{size} · {time} ms round trip"));
     both.into_iter().chain([size]).collect()
 }

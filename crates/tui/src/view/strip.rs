@@ -1,4 +1,4 @@
-//! The last pictures as a strip, the newest at its top, each with what changed since the one before.
+//! The history strip: recent renders, newest first, with the changes since the previous one.
 
 use super::preview;
 use super::strip_words::{EntryText, fitting};
@@ -6,11 +6,12 @@ use super::text::{Tone, put, rest, row};
 use crate::action::Action;
 use crate::film::Picture;
 use crate::keymap;
+use crate::messages;
 use crate::state::State;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-/// Rows of an entry: of its picture, of all of it, and up to the next one.
+/// Rows of an entry: of its thumbnail, in total, and from one entry to the next.
 #[derive(Clone, Copy)]
 struct EntryRows {
     picture: u16,
@@ -18,35 +19,35 @@ struct EntryRows {
     pitch: u16,
 }
 
-/// In a narrow strip, a row stays free below the picture, unless the words need it.
+/// In a narrow strip, the row below a thumbnail stays empty unless the text needs it.
 const NARROW_ROWS: EntryRows = EntryRows { picture: 3, entry: 4, pitch: 4 };
 const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
-/// A strip of so many columns is wide.
+/// Minimum columns of a wide strip.
 const WIDE: u16 = 40;
-/// Columns of the words beside a picture.
+/// Minimum columns of the text beside a thumbnail.
 const LEAST_WORDS: u16 = 10;
-/// Width of a column of pictures if there are several.
+/// Width of a column if there are several.
 const COLUMN: u16 = 44;
 
-/// A picture of the strip and its place.
+/// An entry of the strip and its position.
 struct StripEntry {
-    /// Index among the pictures that are kept.
+    /// Index into the history.
     index: usize,
     cells: Rect,
     rows: EntryRows,
 }
 
-/// Draws it at the bottom of an area.
+/// Draws the strip at the bottom of an area.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let items = items(state, area);
     let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
     let depth = state.display.depth;
-    let keys = keymap::of(Action::OlderPicture).map_or("", |binding| binding.label);
+    let keys = keymap::of(Action::OlderPicture).map_or("", |binding| binding.label).replace(' ', " / ");
     let title = Rect { y: top - 1, height: 1, ..area };
     put(
         buffer,
         title,
-        &[("the last pictures", Tone::Strong), ("  ", Tone::Plain), (keys, Tone::Faint)],
+        &[(messages::HISTORY, Tone::Strong), ("  (", Tone::Faint), (&keys, Tone::Faint), (")", Tone::Faint)],
         depth,
     );
     for item in items {
@@ -62,7 +63,7 @@ fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buff
     preview::draw_small(state, picture, place, buffer);
     let is_looked_at = history.looked_at() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
-    // The words stand beside the picture alone, and in the same columns with and without a mark.
+    // The text is beside the thumbnail, in the same columns with and without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", number(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
@@ -74,38 +75,39 @@ fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buff
     }
 }
 
-/// Number of the run that made a picture, or that is making it; a dash if it was stopped.
+/// Number of the render that made an entry; a dash if it was stopped.
 fn number(state: &State, index: usize) -> String {
     let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
     state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
 }
 
-/// Whether the render of a picture goes on.
+/// Whether the render of an entry is running.
 fn is_under_way(state: &State, index: usize) -> bool {
     state.work.is_under_way() && state.picture.history.is_of(index, state.request.generation)
 }
 
-/// Columns of a picture of this height, so that words have room beside it.
+/// Columns of a thumbnail of this height that leave room for text.
 fn width(state: &State, picture: &Picture, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
     width.clamp(1, cells.width.saturating_sub(LEAST_WORDS + 1).max(1))
 }
 
-/// Rows of the whole strip in an area. 0 if there is nothing to choose from, or no room.
+/// Rows of the strip in an area. 0 if there is nothing to choose from or no room.
 pub(super) fn rows(state: &State, area: Rect) -> u16 {
     let items = items(state, area);
     let top = items.iter().map(|item| item.cells.y).min();
     top.map_or(0, |top| area.bottom() - top + 1)
 }
 
-/// The pictures that have room, at the bottom of an area: the newest at the top, and of older ones the one that is looked at.
+/// The entries that fit, at the bottom of an area. The newest is first; the one being looked at is always
+/// included.
 fn items(state: &State, area: Rect) -> Vec<StripEntry> {
     let count = state.picture.history.len();
     let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
     let columns = (area.width / COLUMN).max(1);
     let gap = rows.pitch - rows.entry;
-    // The title has a row.
+    // The title takes one row.
     let most = (area.height + gap).saturating_sub(1) / rows.pitch;
     let room = usize::from(most) * usize::from(columns);
     if count < 2 || room < 2 || area.width < LEAST_WORDS + 8 {
@@ -114,7 +116,7 @@ fn items(state: &State, area: Rect) -> Vec<StripEntry> {
     let shown = count.min(room);
     let looked_at = state.picture.history.looked_at().unwrap_or(count - 1);
     let first = (count - shown).min(looked_at);
-    // As few rows as hold them all.
+    // Use as few rows as possible.
     let high = shown.div_ceil(usize::from(columns)) as u16;
     let width = area.width / columns;
     let place = |number: u16| {
@@ -128,7 +130,7 @@ fn items(state: &State, area: Rect) -> Vec<StripEntry> {
     (0..shown).map(item).collect()
 }
 
-/// The picture of the strip in this area at a cell.
+/// The entry at a cell.
 pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &StripEntry| item.cells.contains((column, row).into());
     items(state, area).into_iter().find(is_there).map(|item| item.index)

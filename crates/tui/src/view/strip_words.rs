@@ -1,33 +1,35 @@
-//! The words beside a picture of the strip: as much of what changed as there is room for, and in any case the new value.
+//! The text of a history entry: as many changes as fit, but always the new value.
 
 use unicode_width::UnicodeWidthStr;
 
+use crate::messages;
 use crate::scene::{key_parts, shortened_key, split_key};
 
-/// Words beside a picture.
+/// Text of a history entry.
 pub(super) struct EntryText {
-    /// The mark and the number, with a blank behind them.
+    /// Mark and number, followed by a blank.
     pub(super) head: String,
-    /// Changes since the picture before.
+    /// Changes since the previous entry.
     pub(super) changes: Vec<String>,
 }
 
-/// Parts of a change to tell, from most to fewest.
+/// How much of a change is shown, from most to least.
 #[derive(Clone, Copy)]
 enum ChangeForm {
-    /// The key with its old and its new value.
+    /// The key with its old and new value.
     Full,
     /// The key with its new value.
     New,
-    /// The last parts of the key, which name one thing and its property, with its new value.
+    /// The last parts of the key, which identify an object and its property, with the new value.
     Short,
-    /// The same of so many changes.
+    /// Like `Short`, but only for this many changes.
     First(usize),
     /// The first change, with the property in one line.
     Cut,
 }
 
-/// Lines of a width: in the first number of rows if that is enough, else in the second. The last line has what is too much.
+/// Lines of at most `width` columns, in the first number of rows if possible, else in the second. Surplus
+/// text is appended to the last line.
 pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [ChangeForm::Full, ChangeForm::New, ChangeForm::Short];
@@ -52,7 +54,7 @@ pub(super) fn fitting(words: &EntryText, width: usize, rows: [usize; 2]) -> Vec<
     lines
 }
 
-/// Pieces of the changes that stay whole if they fit into a line.
+/// Pieces of the changes that are kept in one line if possible.
 fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece> {
     let changes = &words.changes;
     let told = match form {
@@ -63,7 +65,11 @@ fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece>
     let mut pieces = Vec::new();
     for (number, change) in (1..).zip(changes.iter().take(told)) {
         pieces.extend(of_change(change, form, width.saturating_sub(words.head.width())));
-        let end = if number < told { ";" } else { "" };
+        let end = match () {
+            () if number == told => "",
+            () if change == messages::STOPPED => ":",
+            () => ";",
+        };
         if let Some(ChangePiece { text, .. }) = pieces.last_mut() {
             *text += end;
         }
@@ -74,7 +80,7 @@ fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece>
     pieces
 }
 
-/// A piece of a change that stays in one line if it fits.
+/// Text that is kept in one line if possible.
 struct ChangePiece {
     text: String,
     is_key: bool,
@@ -85,7 +91,7 @@ impl ChangePiece {
         Self { text: text.into(), is_key: false }
     }
 
-    /// The parts that a line can end with: those of a key, or words.
+    /// The parts after which a line may break: those of a key, or words.
     fn parts(&self) -> Vec<String> {
         if !self.is_key {
             return self.text.split(' ').map(str::to_owned).collect();
@@ -98,7 +104,7 @@ impl ChangePiece {
     }
 }
 
-/// Pieces of one change: the key, its values; or single words.
+/// Pieces of a change: the key and its values, or single words.
 fn of_change(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePiece> {
     let words = |text: &str| text.split(' ').map(ChangePiece::words).collect::<Vec<_>>();
     let key = |key: &str| ChangePiece { text: in_form(key, form, beside_head), is_key: true };
@@ -129,7 +135,8 @@ fn in_form(key: &str, form: ChangeForm, beside_head: usize) -> String {
     }
 }
 
-/// The end of a key that names one thing and its property: `lamp.emission` of `materials.lamp.emission`, all of `light.1.direction`.
+/// The last parts of a key, which identify an object and its property: `lamp.emission` of
+/// `materials.lamp.emission`, or all of `light.1.direction`.
 fn last_parts(key: &str) -> String {
     let parts = key_parts(key);
     let first = parts.len().saturating_sub(2);
@@ -137,8 +144,8 @@ fn last_parts(key: &str) -> String {
     parts[first.saturating_sub(usize::from(is_number))..].join(".")
 }
 
-/// Puts pieces into lines behind a head. Pieces that are too long for a line are broken: keys behind a point, all else between
-/// words.
+/// Fills lines with pieces, after a head. Pieces that are too long are broken, keys after a dot and others
+/// between words.
 fn filled(head: &str, pieces: &[ChangePiece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
@@ -171,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn the_number_stands_beside_the_key_and_the_new_value_is_whole() {
+    fn number_precedes_key_and_value_is_complete() {
         let emission = "materials.lamp.emission [14, 13, 11] → [20, 13, 5]";
         assert_eq!(lines("▸4", &[emission], 13), ["▸4 materials.", "lamp.emission", "→ [20, 13, 5]"]);
         assert_eq!(lines("▸4", &[emission], 12), ["▸4 lamp.", "emission →", "[20, 13, 5]"]);
@@ -184,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn the_property_is_never_left_out() {
+    fn property_is_never_left_out() {
         let quoted = "materials.\"copper ball\".roughness 0.1 → 0.4";
         let light = "light.1.direction [0, -1, 0] → [0.25, -1, 0.5]";
         let comes = "+ materials.\"copper ball\".roughness = 0.4";
@@ -204,16 +211,13 @@ mod tests {
     }
 
     #[test]
-    fn settings_that_are_the_scenes_again_are_one_change() {
-        assert_eq!(
-            lines(" 4", &["back to the scene's integrator, view"], 60),
-            [" 4 back to the scene's integrator, view"]
-        );
+    fn reset_settings_are_one_change() {
+        assert_eq!(lines(" 4", &["integrator and view reset"], 60), [" 4 integrator and view reset"]);
     }
 
     #[test]
-    fn a_mark_breaks_no_line() {
-        let changes = ["unfinished", "shadows hard", "back to the scene's view, camera"];
+    fn mark_does_not_break_the_line() {
+        let changes = [messages::STOPPED, "shadows hard", "view and camera reset"];
         for width in 10..30 {
             let [with, without] = ["▸7", " 7"].map(|number| lines(number, &changes, width));
             assert_eq!(with[1..], without[1..], "{width}");
@@ -222,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn several_changes_are_told_as_far_as_there_is_room() {
+    fn changes_are_shortened_to_fit() {
         let changes =
             ["camera.fov 40 → 30", "materials.lamp.emission [14, 13, 11] → [20, 13, 5]", "shadows hard"];
         let wide = lines("▸4", &changes, 40).join("|");
@@ -235,9 +239,9 @@ mod tests {
     }
 
     #[test]
-    fn as_many_changes_are_told_as_there_is_room_for() {
-        let changes = ["unfinished", "camera.fov 40 → 25.0", "render.samples 64 → 16"];
-        assert_eq!(lines(" –", &changes, 14), [" – unfinished;", "camera.fov", "→ 25.0 …"]);
+    fn as_many_changes_as_fit_are_shown() {
+        let changes = [messages::STOPPED, "camera.fov 40 → 25.0", "render.samples 64 → 16"];
+        assert_eq!(lines(" –", &changes, 14), [" – stopped:", "camera.fov", "→ 25.0 …"]);
         let six = [
             "+ render.shadows = \"off\"",
             "camera.position [0, 1, 4] → [-0.3773, 0.9512, 3.5904]",

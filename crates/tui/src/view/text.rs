@@ -1,4 +1,4 @@
-//! Text for cells: styles that do without color, amounts in words.
+//! Text in cells: styles that work without color, and formatted quantities.
 
 use std::time::Duration;
 
@@ -10,32 +10,32 @@ use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 use crate::color::ColorDepth;
 pub(super) use crate::pipeline::words::seconds;
 
-/// Role of a piece of text. The colors are those of the terminal's own palette of 16, which follow its theme.
+/// Role of a piece of text. Its color is one of the 16 ANSI colors, which follow the terminal's theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Tone {
     Plain,
-    /// Settled, or less important.
+    /// Finished or less important.
     Faint,
-    /// New, or to be read first.
+    /// New, or most important.
     Strong,
     Working,
     Good,
     Warning,
     Error,
-    /// The name of a written file: a link, where the terminal has them.
+    /// Name of a written file, a hyperlink if the terminal supports them.
     File,
-    /// The line that is chosen of a list.
+    /// The selected line of a list.
     Chosen,
 }
 
 impl Tone {
-    /// Its style; without colors, modifiers alone.
+    /// The style of the text; without colors, only modifiers.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
             Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
             Self::Faint => (Color::Reset, Modifier::DIM),
             Self::Strong => (Color::Reset, Modifier::BOLD),
-            // The plain blue of many palettes cannot be read on black.
+            // Plain blue is hard to read on black in many palettes.
             Self::Working => (Color::LightBlue, Modifier::empty()),
             Self::Good => (Color::Green, Modifier::empty()),
             Self::Warning => (Color::Yellow, Modifier::empty()),
@@ -46,7 +46,8 @@ impl Tone {
         Style::new().fg(color).bg(Color::Reset).add_modifier(modifier)
     }
 
-    /// The same as a block of color, black or white on it, whichever every theme can read; without colors reversed.
+    /// The style of a solid block with black or white text, whichever is readable in every theme; reversed
+    /// without colors.
     pub(super) fn block(self, depth: ColorDepth) -> Style {
         let (fg, bg) = match self {
             _ if depth == ColorDepth::None => (Color::Reset, Color::Reset),
@@ -58,15 +59,14 @@ impl Tone {
                 (Color::Reset, Color::Reset)
             }
         };
-        // Bold black is gray in xterm and others, which draw bold by the brighter half of the palette.
+        // xterm and others draw bold black as gray, the bright half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
         let modifier = if bg == Color::Reset { reversed } else { Modifier::empty() };
         Style::new().fg(fg).bg(bg).add_modifier(modifier)
     }
 }
 
-/// Writes pieces from the left into the first row of the area; what does not fit is cut and ends in `…`. Returns the
-/// columns used.
+/// Writes text into the first row of an area, shortened with an ellipsis if needed. Returns the columns used.
 pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], depth: ColorDepth) -> u16 {
     let area = area.intersection(buffer.area);
     if area.is_empty() {
@@ -80,14 +80,14 @@ pub(super) fn put(buffer: &mut Buffer, area: Rect, pieces: &[(&str, Tone)], dept
         let style = tone.style(depth);
         x = buffer.set_stringn(x, area.y, text, usize::from(end - x), style).0;
         if is_cut && x + 1 >= end && columns(text) > 0 {
-            // A character of two columns may leave one of them.
+            // A wide character may leave one column.
             buffer.set_stringn(x, area.y, "…", 1, style);
         }
     }
     if is_cut { area.width } else { x - area.x }
 }
 
-/// Writes a text so that it ends at the right edge of the first row, if it fits.
+/// Writes text at the right edge of the first row, if it fits.
 pub(super) fn put_right(buffer: &mut Buffer, area: Rect, text: &str, tone: Tone, depth: ColorDepth) -> u16 {
     let width = columns(text);
     if width > area.width {
@@ -96,23 +96,23 @@ pub(super) fn put_right(buffer: &mut Buffer, area: Rect, text: &str, tone: Tone,
     put(buffer, Rect { x: area.right() - width, width, ..area }, &[(text, tone)], depth)
 }
 
-/// Columns that a text takes.
+/// Width of a text in columns.
 pub(crate) fn columns(text: &str) -> u16 {
     u16::try_from(text.width()).unwrap_or(u16::MAX)
 }
 
-/// A row of the area, counted from its top; empty below its end.
+/// A row of an area, counted from its top; empty beyond its end.
 pub(super) fn row(area: Rect, index: u16) -> Rect {
     if index < area.height { Rect { y: area.y + index, height: 1, ..area } } else { Rect::ZERO }
 }
 
-/// The rest of a row to the right of the columns used.
+/// The rest of a row to the right of the used columns.
 pub(super) fn rest(area: Rect, used: u16) -> Rect {
     let used = used.min(area.width);
     Rect { x: area.x + used, width: area.width - used, ..area }
 }
 
-/// The text as far as it fits, with an ellipsis if it is cut.
+/// Shortens a text to fit, with an ellipsis.
 pub(crate) fn shortened(text: &str, room: u16) -> String {
     if columns(text) <= room {
         return text.to_owned();
@@ -129,7 +129,7 @@ pub(crate) fn shortened(text: &str, room: u16) -> String {
     if room == 0 { short } else { format!("{}…", short.trim_end()) }
 }
 
-/// Breaks a text into lines, between words if possible.
+/// Wraps a text into lines, between words if possible.
 pub fn wrapped(text: &str, width: usize) -> Vec<String> {
     let width = width.max(1);
     let (mut lines, mut line, mut length) = (Vec::new(), String::new(), 0);
@@ -158,12 +158,12 @@ pub(crate) fn duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
 }
 
-/// A time that runs and does not flicker: tenths of seconds until a minute.
+/// A running time, with tenths of seconds up to a minute so that it does not flicker.
 pub(super) fn running(time: Duration) -> String {
     if time.as_secs() < 60 { format!("{:.1} s", time.as_secs_f64()) } else { duration(time) }
 }
 
-/// A size of a file.
+/// A file size.
 pub(super) fn bytes(bytes: u64) -> String {
     match bytes {
         0..1000 => format!("{bytes} B"),
@@ -173,7 +173,7 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// A time that is expected, with two digits at most: `about 9 s`.
+/// An estimated time with at most two digits: `about 9 s`.
 pub(super) fn about(seconds: f64) -> String {
     match seconds {
         x if x < 1.0 => "under 1 s".to_owned(),
@@ -184,9 +184,9 @@ pub(super) fn about(seconds: f64) -> String {
     }
 }
 
-/// Change of a stage's time, in the unit of the time unless the change is far greater; empty if it means nothing.
+/// Change of a stage's time, in the unit of the time unless it is far larger; empty if insignificant.
 pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
-    /// Times of the same work differ by so much.
+    /// Relative variation of identical work.
     const NOISE: f64 = 0.05;
     let Some(before) = before else { return String::new() };
     let change = seconds - before;
@@ -208,7 +208,7 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     }
 }
 
-/// A thin bar: its filled part and the rest, together of this many columns.
+/// A thin progress bar of `columns` columns: filled and empty part.
 pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
     let columns = usize::from(columns);
@@ -216,12 +216,12 @@ pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String
     (full.repeat(filled), empty.repeat(columns - filled))
 }
 
-/// Whole percent; 100 only when everything is done.
+/// Whole percent; 100 only when finished.
 pub(crate) fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }
 
-/// A small part in percent, with two digits: `2.1 %`, `1 %`.
+/// A fraction in percent with two digits: `2.1 %`, `1 %`.
 pub(super) fn share(part: f64) -> String {
     let percent = part * 100.0;
     let digits = if percent > 0.0 { (1 - percent.log10().floor() as i32).clamp(0, 6) } else { 0 };
@@ -230,7 +230,7 @@ pub(super) fn share(part: f64) -> String {
     format!("{text} %")
 }
 
-/// Three digits or more.
+/// Formats a number with at least three digits.
 pub(super) fn number(x: f32) -> String {
     let digits = match x.abs() {
         x if x >= 100.0 => 0,
@@ -254,7 +254,7 @@ mod tests {
 
     /// xterm draws bold black as gray.
     #[test]
-    fn nothing_on_a_block_of_color_is_bold() {
+    fn text_on_color_blocks_is_not_bold() {
         for tone in [Tone::Working, Tone::Good, Tone::Warning, Tone::Error] {
             let style = tone.block(ColorDepth::TrueColor);
             assert!(!style.add_modifier.contains(Modifier::BOLD), "{tone:?}");
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bar_is_full_only_at_the_end() {
+    fn bar_is_full_only_at_the_end() {
         let bar = |fraction, ascii| {
             let (filled, rest) = gauge(fraction, 4, ascii);
             filled + &rest
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn the_change_of_a_time_is_told_in_its_unit() {
+    fn time_changes_use_the_unit_of_the_time() {
         for (seconds, before, words) in [
             (1.12, Some(1.42), "−.3 s"),
             (1.12, Some(1.10), ""),
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn an_expected_time_has_two_digits() {
+    fn estimated_times_have_two_digits() {
         let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(about);
         let words = [
             "under 1 s",
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn every_text_that_is_cut_says_so() {
+    fn shortened_text_has_an_ellipsis() {
         for (text, room, shown) in [
             ("abcdef", 6, "abcdef"),
             ("abcdef", 5, "abcd…"),
@@ -332,7 +332,7 @@ mod tests {
                 let (first, second) = text.split_at(split);
                 put(&mut buffer, area, &[(first, Tone::Plain), (second, Tone::Faint)], ColorDepth::None);
                 let seen: String = buffer.content.iter().map(|cell| cell.symbol()).collect();
-                // The right half of a wide character is a blank of the buffer.
+                // The right half of a wide character is blank in the buffer.
                 assert_eq!(seen.replace(' ', ""), shown, "{text} {room} {split}");
             }
         }

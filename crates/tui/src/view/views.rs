@@ -1,4 +1,4 @@
-//! The list of views, for a moment after one was chosen: in the panel if that has room, else over the picture.
+//! The list of views, shown briefly after one was chosen, in the panel or over the image.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -10,9 +10,9 @@ use crate::choice::Choice;
 use crate::pipeline::settings::View;
 use crate::state::State;
 
-/// Columns of one view with its digit.
+/// Columns of a view with its digit.
 const WIDTH: u16 = 16;
-/// Views that have a digit, always the same one.
+/// Number of views with a digit.
 pub(crate) const DIGITS: usize = 9;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
@@ -21,11 +21,11 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     if area.is_empty() {
         return;
     }
-    // Nothing that the list cuts off stays in sight beside or below it.
+    // Clear everything that the list would cut off.
     let is_in_panel = layout.panel.intersection(area) == area;
     Clear.render(if is_in_panel { layout.panel } else { area }, buffer);
     let (columns, rows) = (usize::from((area.width / WIDTH).max(1)), usize::from(area.height));
-    // Where they do not all fit, the current one is in the middle.
+    // If not all views fit, center the current one.
     let shown = columns * rows;
     let first = current.saturating_sub(shown / 2).min(View::ALL.len().saturating_sub(shown));
     for (index, number) in (first..View::ALL.len()).take(shown).enumerate() {
@@ -44,12 +44,12 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
 }
 
-/// Views of one column below each other.
+/// Views per column.
 pub(crate) fn rows(state: &State) -> usize {
     usize::from(area(&Layout::of(state)).height).max(1)
 }
 
-/// A view with its digit, and a mark if there are more above or below.
+/// Draws a view with its digit, and a mark if there are more above or below.
 fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rect, buffer: &mut Buffer) {
     let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
     let is_current = number == current;
@@ -61,7 +61,7 @@ fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rec
     put(buffer, place, &pieces, state.display.depth);
 }
 
-/// One column in a panel that is high enough, else two or what there is room for.
+/// One column in a panel that is high enough, else as many as fit.
 fn area(layout: &Layout) -> Rect {
     let all = View::ALL.len() as u16;
     let panel = layout.panel;
