@@ -5,7 +5,7 @@ use std::os::unix::fs::symlink;
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 /// A ball on a floor under a lamp: few pixels, some indirect light.
 const SCENE: &str = r#"[render]
@@ -34,25 +34,25 @@ material = "lamp"
 /// Options for a measurement small enough for a test.
 const SMALL: &str = "--samples 1,4 --reference-samples 64 --seeds 3 --progress none";
 
-fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.write("box.toml", SCENE);
-    desk
+fn dir() -> TestDir {
+    let dir = TestDir::new();
+    dir.write("box.toml", SCENE);
+    dir
 }
 
 /// Runs `glimt bench` with a cache of its own; returns stdout and stderr.
 #[track_caller]
-fn bench(desk: &Desk, line: &str, code: i32) -> (String, String) {
-    let mut process = desk.glimt(&format!("bench {line}"));
-    let output = process.env("XDG_CACHE_HOME", desk.path("cache")).output().expect("it runs");
+fn bench(dir: &TestDir, line: &str, code: i32) -> (String, String) {
+    let mut process = dir.glimt(&format!("bench {line}"));
+    let output = process.env("XDG_CACHE_HOME", dir.path("cache")).output().expect("it runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     let (stdout, stderr) = (text(output.stdout), text(output.stderr));
     assert_eq!(output.status.code(), Some(code), "{line}\n{stdout}\n{stderr}");
     (stdout, stderr)
 }
 
-fn json(desk: &Desk, name: &str) -> Value {
-    serde_json::from_slice(&desk.bytes(name)).expect("JSON")
+fn json(dir: &TestDir, name: &str) -> Value {
+    serde_json::from_slice(&dir.bytes(name)).expect("JSON")
 }
 
 /// The errors of all pictures.
@@ -65,9 +65,9 @@ fn errors(results: &Value) -> Vec<f64> {
 
 #[test]
 fn a_scene_is_measured_from_end_to_end() {
-    let desk = desk();
+    let dir = dir();
     let (stdout, stderr) =
-        bench(&desk, &format!("box.toml {SMALL} --csv a.csv --json a.json --plot a.svg"), 0);
+        bench(&dir, &format!("box.toml {SMALL} --csv a.csv --json a.json --plot a.svg"), 0);
     assert_eq!(stderr, "");
     assert!(
         stdout
@@ -85,12 +85,12 @@ fn a_scene_is_measured_from_end_to_end() {
         "ambient light in place of what bounces: {stdout}"
     );
     assert!(stdout.lines().all(|line| line.chars().count() <= 80 || line.contains("set-up")), "{stdout}");
-    let results = json(&desk, "a.json");
+    let results = json(&dir, "a.json");
     assert_eq!(errors(&results).len(), 3 * 2 * 3);
     assert!(errors(&results)[..3].iter().all(|error| *error > 0.0));
-    let text = String::from_utf8(desk.bytes("a.csv")).expect("UTF-8");
+    let text = String::from_utf8(dir.bytes("a.csv")).expect("UTF-8");
     assert_eq!(text.split_terminator("\r\n").count(), 1 + 18);
-    let svg = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
+    let svg = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     let plot = roxmltree::Document::parse(&svg).expect("XML");
     let said: Vec<_> = plot.descendants().filter_map(|node| node.text()).collect();
     assert!(said.iter().any(|text| text.contains("whitted photons, slope")), "{said:?}");
@@ -102,62 +102,62 @@ fn a_scene_is_measured_from_end_to_end() {
 
 #[test]
 fn the_same_seeds_have_the_same_errors_and_references_are_made_once() {
-    let desk = desk();
+    let dir = dir();
     let line = format!("box.toml {SMALL} --integrator path --json");
-    bench(&desk, &format!("{line} a.json"), 0);
-    bench(&desk, &format!("{line} b.json --threads 1"), 0);
-    let (a, b) = (json(&desk, "a.json"), json(&desk, "b.json"));
+    bench(&dir, &format!("{line} a.json"), 0);
+    bench(&dir, &format!("{line} b.json --threads 1"), 0);
+    let (a, b) = (json(&dir, "a.json"), json(&dir, "b.json"));
     assert_eq!(errors(&a), errors(&b));
     let is_cached =
         |results: &Value| results["scenes"][0]["reference"]["is_cached"].as_bool().expect("a flag");
     assert!(!is_cached(&a) && is_cached(&b));
     let kept = || {
-        fs::read_dir(desk.path("cache/glimt/references"))
+        fs::read_dir(dir.path("cache/glimt/references"))
             .expect("a folder")
             .map(|entry| entry.expect("a file").path())
     };
     for file in kept() {
         fs::write(&file, "broken").expect("written");
     }
-    bench(&desk, &format!("{line} c.json"), 0);
-    assert!(!is_cached(&json(&desk, "c.json")), "a broken file is made again");
-    assert_eq!(errors(&json(&desk, "c.json")), errors(&a));
-    desk.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
-    bench(&desk, &format!("{line} d.json"), 0);
-    assert!(!is_cached(&json(&desk, "d.json")), "another scene");
+    bench(&dir, &format!("{line} c.json"), 0);
+    assert!(!is_cached(&json(&dir, "c.json")), "a broken file is made again");
+    assert_eq!(errors(&json(&dir, "c.json")), errors(&a));
+    dir.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
+    bench(&dir, &format!("{line} d.json"), 0);
+    assert!(!is_cached(&json(&dir, "d.json")), "another scene");
     assert_eq!(kept().count(), 2);
-    bench(&desk, &format!("{line} e.json --no-cache"), 0);
+    bench(&dir, &format!("{line} e.json --no-cache"), 0);
     assert!(
-        !is_cached(&json(&desk, "e.json"))
-            && errors(&json(&desk, "e.json")) == errors(&json(&desk, "d.json"))
+        !is_cached(&json(&dir, "e.json"))
+            && errors(&json(&dir, "e.json")) == errors(&json(&dir, "d.json"))
     );
 }
 
 #[test]
 fn a_run_is_compared_with_an_older_one() {
-    let desk = desk();
+    let dir = dir();
     let line = format!("box.toml {SMALL} --integrator path");
-    bench(&desk, &format!("{line} --json old.json"), 0);
-    let (stdout, _) = bench(&desk, &format!("{line} --baseline old.json"), 0);
+    bench(&dir, &format!("{line} --json old.json"), 0);
+    let (stdout, _) = bench(&dir, &format!("{line} --baseline old.json"), 0);
     assert!(stdout.contains("against old.json, with 95 % confidence:"), "{stdout}");
     assert!(stdout.contains("box.toml, path: error × 1.000 (1.000 to 1.000): the same"), "{stdout}");
-    let (stdout, _) = bench(&desk, &format!("{line} --clamp 0.01 --baseline old.json"), 0);
+    let (stdout, _) = bench(&dir, &format!("{line} --clamp 0.01 --baseline old.json"), 0);
     assert!(stdout.contains("nothing of old.json can be compared"), "another method: {stdout}");
     let (stdout, _) = bench(
-        &desk,
+        &dir,
         &format!("{line} --set render.max_depth=1 --set render.shadow_samples=64 --baseline old.json"),
         0,
     );
     assert!(stdout.contains(": error × 0."), "less light is less noise: {stdout}");
-    desk.write("odd.json", "{}");
-    let (_, stderr) = bench(&desk, &format!("{line} --baseline odd.json"), 2);
+    dir.write("odd.json", "{}");
+    let (_, stderr) = bench(&dir, &format!("{line} --baseline odd.json"), 2);
     assert!(
         stderr.starts_with("error: odd.json is no baseline: ")
             && stderr.contains("`glimt bench --json FILE` wrote"),
         "{stderr}"
     );
     assert!(
-        bench(&desk, &format!("{line} --baseline none.json"), 2)
+        bench(&dir, &format!("{line} --baseline none.json"), 2)
             .1
             .starts_with("error: cannot read none.json: ")
     );
@@ -165,11 +165,11 @@ fn a_run_is_compared_with_an_older_one() {
 
 #[test]
 fn a_baseline_that_is_no_file_is_not_read() {
-    let desk = desk();
-    let pipe = desk.path("pipe.json");
+    let dir = dir();
+    let pipe = dir.path("pipe.json");
     nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     for name in ["pipe.json", "/dev/zero"] {
-        let (_, stderr) = bench(&desk, &format!("box.toml {SMALL} --baseline {name}"), 2);
+        let (_, stderr) = bench(&dir, &format!("box.toml {SMALL} --baseline {name}"), 2);
         assert_eq!(
             stderr,
             format!("error: cannot read {name}: it is a pipe, a socket or a device, not a regular file\n")
@@ -179,25 +179,25 @@ fn a_baseline_that_is_no_file_is_not_read() {
 
 #[test]
 fn all_scenes_are_looked_at_before_the_first_is_measured() {
-    let desk = desk();
-    desk.write("broken.toml", SCENE.replace("radius = 0.5", "radius = -1"));
+    let dir = dir();
+    dir.write("broken.toml", SCENE.replace("radius = 0.5", "radius = -1"));
     let line = format!("box.toml none.toml broken.toml {SMALL} --csv a.csv");
-    let (stdout, stderr) = bench(&desk, &line, 2);
+    let (stdout, stderr) = bench(&dir, &line, 2);
     assert_eq!(stdout, "");
     assert!(stderr.contains("none.toml") && stderr.contains("broken.toml:13"), "all that is wrong: {stderr}");
-    assert!(!desk.path("a.csv").exists());
-    assert!(!desk.path("cache/glimt/references").exists(), "nothing was measured");
+    assert!(!dir.path("a.csv").exists());
+    assert!(!dir.path("cache/glimt/references").exists(), "nothing was measured");
     // This output is a file that the second scene reads.
-    desk.write("skin.ppm", "P6\n1 1\n255\nabc");
+    dir.write("skin.ppm", "P6\n1 1\n255\nabc");
     let skin = "diffuse = { texture = \"skin\" }\n[textures.skin]\nfile = \"skin.ppm\"\n[materials.other]\ndiffuse = 0";
-    desk.write(
+    dir.write(
         "skin.toml",
         SCENE
             .replace("wall = { diffuse = [0.6, 0.6, 0.5] }", &format!("[materials.wall]\n{skin}"))
             .replace("lamp = { emission = [8, 8, 8] }", "[materials.lamp]\nemission = 8"),
     );
-    std::os::unix::fs::symlink("skin.ppm", desk.path("a.svg")).expect("a link");
-    let (stdout, stderr) = bench(&desk, &format!("box.toml skin.toml {SMALL} --plot a.svg --force"), 2);
+    std::os::unix::fs::symlink("skin.ppm", dir.path("a.svg")).expect("a link");
+    let (stdout, stderr) = bench(&dir, &format!("box.toml skin.toml {SMALL} --plot a.svg --force"), 2);
     assert_eq!(stdout, "");
     assert!(
         stderr.starts_with("error: cannot write a.svg: it is a file that skin.toml is made of"),
@@ -207,29 +207,29 @@ fn all_scenes_are_looked_at_before_the_first_is_measured() {
 
 #[test]
 fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
-    let desk = desk();
+    let dir = dir();
     for seed in [8, 9] {
         let line =
             format!("box.toml --once --integrator path --samples 64 --seed {seed} --width 12 --height 8");
-        desk.expect(&format!("{line} --progress none -o r{seed}.exr"), 0);
+        dir.expect(&format!("{line} --progress none -o r{seed}.exr"), 0);
     }
     let line = "box.toml --samples 1,4 --seeds 3 --integrator path --progress none --reference r8.exr";
-    let (two, _) = bench(&desk, &format!("{line} --reference r9.exr"), 0);
+    let (two, _) = bench(&dir, &format!("{line} --reference r9.exr"), 0);
     assert!(
         two.starts_with("box.toml, 12×8 pixels, 3 seeds\nreferences: r8.exr and r9.exr, noise "),
         "{two}"
     );
-    let (one, _) = bench(&desk, line, 0);
+    let (one, _) = bench(&dir, line, 0);
     assert!(one.contains("\nreference: r8.exr, alone: its own noise is read as error\n"), "{one}");
-    let (_, stderr) = bench(&desk, &format!("{line} --csv r8.exr"), 2);
+    let (_, stderr) = bench(&dir, &format!("{line} --csv r8.exr"), 2);
     assert_eq!(
         stderr,
         "error: cannot write r8.exr: it is a reference of this call; name another file with --csv FILE\n"
     );
-    let (_, stderr) = bench(&desk, "box.toml --reference none.exr", 2);
+    let (_, stderr) = bench(&dir, "box.toml --reference none.exr", 2);
     assert!(stderr.contains("cannot read none.exr"), "{stderr}");
     assert!(
-        bench(&desk, "box.toml ball.toml --reference r8.exr", 2)
+        bench(&dir, "box.toml ball.toml --reference r8.exr", 2)
             .1
             .contains("--reference belongs to one scene")
     );
@@ -237,12 +237,12 @@ fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
 
 #[test]
 fn no_output_is_an_input_or_another_output() {
-    let desk = desk();
-    desk.write("skin.ppm", "P6\n1 1\n255\nabc");
+    let dir = dir();
+    dir.write("skin.ppm", "P6\n1 1\n255\nabc");
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
-    desk.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
-    symlink("box.toml", desk.path("link.csv")).expect("a link");
-    symlink("skin.ppm", desk.path("skin.csv")).expect("a link");
+    dir.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
+    symlink("box.toml", dir.path("link.csv")).expect("a link");
+    symlink("skin.ppm", dir.path("skin.csv")).expect("a link");
     for (line, words) in [
         (
             "box.toml --csv box.toml",
@@ -259,10 +259,10 @@ fn no_output_is_an_input_or_another_output() {
             "cannot write skin.csv: it is a file that skin.toml is made of; name another file",
         ),
     ] {
-        let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
+        let (_, stderr) = bench(&dir, &format!("{line} {SMALL}"), 2);
         assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
     }
-    assert_eq!(desk.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
+    assert_eq!(dir.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
     // The file's name is missing: the next word is taken for it.
     for (line, words) in [
         (
@@ -274,50 +274,50 @@ fn no_output_is_an_input_or_another_output() {
             "the file of this name is not a file of results that glimt wrote; name another",
         ),
     ] {
-        let (_, stderr) = bench(&desk, &format!("{line} {SMALL}"), 2);
+        let (_, stderr) = bench(&dir, &format!("{line} {SMALL}"), 2);
         assert!(stderr.starts_with("error: cannot write ball.toml: ") && stderr.contains(words), "{stderr}");
     }
-    assert_eq!(desk.bytes("ball.toml"), super::desk::SCENE.as_bytes());
-    let (_, stderr) = bench(&desk, "box.toml --csv none/a.csv", 1);
+    assert_eq!(dir.bytes("ball.toml"), super::test_dir::SCENE.as_bytes());
+    let (_, stderr) = bench(&dir, "box.toml --csv none/a.csv", 1);
     assert!(stderr.contains("the directory none does not exist"), "{stderr}");
 }
 
 #[test]
 fn a_file_that_cannot_be_written_does_not_cost_the_others() {
-    let desk = desk();
-    symlink("/dev/full", desk.path("full.csv")).expect("a link");
+    let dir = dir();
+    symlink("/dev/full", dir.path("full.csv")).expect("a link");
     let line =
         "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
-    let (_, stderr) = bench(&desk, &format!("{line} --csv full.csv --json a.json --plot a.svg"), 1);
+    let (_, stderr) = bench(&dir, &format!("{line} --csv full.csv --json a.json --plot a.svg"), 1);
     assert!(stderr.starts_with("error: cannot write full.csv: no space left on device"), "{stderr}");
-    assert!(stderr.lines().count() == 1 && errors(&json(&desk, "a.json")).len() == 1, "{stderr}");
-    assert!(desk.path("a.svg").is_file());
+    assert!(stderr.lines().count() == 1 && errors(&json(&dir, "a.json")).len() == 1, "{stderr}");
+    assert!(dir.path("a.svg").is_file());
     // Results replace results, whatever their names.
     for _ in 0..2 {
-        bench(&desk, &format!("{line} --json results --csv table"), 0);
+        bench(&dir, &format!("{line} --json results --csv table"), 0);
     }
 }
 
 #[test]
 fn nothing_is_said_of_a_picture_that_is_not_written() {
-    let desk = desk();
+    let dir = dir();
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
     // The picture that a render would write is the scene's texture, by its default name and by `output`.
     for (name, output) in [("skin.toml", ""), ("other.toml", "output = \"skin.png\"\n")] {
         let scene = textured.replace("[render]\n", &format!("[render]\n{output}"));
-        desk.write(name, format!("{scene}\n[textures.skin]\nfile = \"skin.png\"\n"));
-        image::RgbImage::new(2, 2).save(desk.path("skin.png")).expect("saved");
+        dir.write(name, format!("{scene}\n[textures.skin]\nfile = \"skin.png\"\n"));
+        image::RgbImage::new(2, 2).save(dir.path("skin.png")).expect("saved");
         let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
-        let (_, stderr) = bench(&desk, &format!("{name} {line}"), 0);
+        let (_, stderr) = bench(&dir, &format!("{name} {line}"), 0);
         assert_eq!(stderr, "", "{name}");
     }
 }
 
 #[test]
 fn wrong_calls_are_told_in_words() {
-    let desk = desk();
-    desk.write("wrong.toml", SCENE.replace("radius = 0.5", "radius = -1"));
-    let (_, stderr) = bench(&desk, "wrong.toml", 2);
+    let dir = dir();
+    dir.write("wrong.toml", SCENE.replace("radius = 0.5", "radius = -1"));
+    let (_, stderr) = bench(&dir, "wrong.toml", 2);
     assert!(stderr.contains("wrong.toml:13:"), "{stderr}");
     for (line, words) in [
         ("none.toml", "there is no such scene file"),
@@ -329,38 +329,38 @@ fn wrong_calls_are_told_in_words() {
         ("box.toml --integrator paths", "paths"),
         ("box.toml --seed 4294967290", "--seed 4294967290 is too large"),
     ] {
-        let (_, stderr) = bench(&desk, line, 2);
+        let (_, stderr) = bench(&dir, line, 2);
         assert!(stderr.contains(words), "{line}: {stderr}");
     }
 }
 
 #[test]
 fn progress_is_said_in_lines_or_objects() {
-    let desk = desk();
+    let dir = dir();
     let line = "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache";
-    let (stdout, plain) = bench(&desk, line, 0);
+    let (stdout, plain) = bench(&dir, line, 0);
     assert!(
         plain.contains("box.toml: references of 24×16 pixels in ")
             && plain.contains("box.toml: path, 1 sample: "),
         "{plain}"
     );
     assert!(stdout.contains("too few seeds to tell a bias"), "{stdout}");
-    let (_, objects) = bench(&desk, &format!("{line} --progress json --csv a.csv"), 0);
+    let (_, objects) = bench(&dir, &format!("{line} --progress json --csv a.csv"), 0);
     let objects: Vec<Value> = objects.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let events: Vec<_> = objects.iter().map(|object| object["event"].as_str().expect("a name")).collect();
     assert!(events.contains(&"progress") && events.contains(&"step"), "{events:?}");
     assert_eq!(events[events.len() - 2..], ["written", "done"]);
-    let (_, failed) = bench(&desk, "none.toml --progress json", 2);
+    let (_, failed) = bench(&dir, "none.toml --progress json", 2);
     let failed: Value = serde_json::from_str(failed.lines().last().expect("a line")).expect("JSON");
     assert_eq!((&failed["event"], &failed["kind"]), (&"failed".into(), &"scene".into()));
 }
 
 #[test]
 fn budgets_of_time_are_points_too() {
-    let desk = desk();
+    let dir = dir();
     let line = "box.toml --time 0.02,0.01 --reference-samples 16 --seeds 2 --integrator path --progress none";
-    bench(&desk, &format!("{line} --json a.json"), 0);
-    let results = json(&desk, "a.json");
+    bench(&dir, &format!("{line} --json a.json"), 0);
+    let results = json(&dir, "a.json");
     let steps = results["scenes"][0]["methods"][0]["steps"].as_array().expect("steps").clone();
     let budgets: Vec<_> = steps.iter().map(|step| step["budget"].as_f64().expect("a time")).collect();
     assert_eq!(budgets, [0.01, 0.02]);
@@ -370,9 +370,9 @@ fn budgets_of_time_are_points_too() {
 #[test]
 fn a_signal_ends_it_cleanly() {
     use std::process::Stdio;
-    let desk = desk();
+    let dir = dir();
     let mut process =
-        desk.glimt("bench box.toml --reference-samples 4000000000 --no-cache --csv a.csv --progress json");
+        dir.glimt("bench box.toml --reference-samples 4000000000 --no-cache --csv a.csv --progress json");
     let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
     let mut said = std::io::BufReader::new(child.stderr.take().expect("stderr"));
     let mut line = String::new();
@@ -383,5 +383,5 @@ fn a_signal_ends_it_cleanly() {
     let id = nix::unistd::Pid::from_raw(child.id() as i32);
     nix::sys::signal::kill(id, nix::sys::signal::Signal::SIGINT).expect("sent");
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
-    assert!(!desk.path("a.csv").exists());
+    assert!(!dir.path("a.csv").exists());
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 /// A box with a lamp, open to the camera: most of its walls' light has bounced.
 const SCENE: &str = r#"[render]
@@ -34,19 +34,19 @@ v = [0, 0, 1]
 material = "lamp"
 "#;
 
-fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.write("box.toml", SCENE);
-    desk
+fn dir() -> TestDir {
+    let dir = TestDir::new();
+    dir.write("box.toml", SCENE);
+    dir
 }
 
-fn render(desk: &Desk, name: &str, options: &str) {
-    let output = desk.run(&format!("box.toml --once --progress none -o {name} {options}"));
+fn render(dir: &TestDir, name: &str, options: &str) {
+    let output = dir.run(&format!("box.toml --once --progress none -o {name} {options}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-fn compared(desk: &Desk, a: &str, b: &str) -> Value {
-    serde_json::from_slice(&desk.run(&format!("compare --json {a} {b}")).stdout).expect("JSON")
+fn compared(dir: &TestDir, a: &str, b: &str) -> Value {
+    serde_json::from_slice(&dir.run(&format!("compare --json {a} {b}")).stdout).expect("JSON")
 }
 
 /// Checks that the estimate is between 0.7 and 1.5 times the true error, and that the spread of 24 values is within a
@@ -54,12 +54,12 @@ fn compared(desk: &Desk, a: &str, b: &str) -> Value {
 #[test]
 fn seeds_that_differ_have_a_z_of_chance() {
     const PAIRS: u32 = 24;
-    let desk = desk();
+    let dir = dir();
     let z: Vec<f64> = (0..PAIRS)
         .map(|pair| {
-            render(&desk, "a.exr", &format!("--seed {}", 2 * pair + 1));
-            render(&desk, "b.exr", &format!("--seed {}", 2 * pair + 2));
-            compared(&desk, "a.exr", "b.exr")["bias_z"].as_f64().expect("z")
+            render(&dir, "a.exr", &format!("--seed {}", 2 * pair + 1));
+            render(&dir, "b.exr", &format!("--seed {}", 2 * pair + 2));
+            compared(&dir, "a.exr", "b.exr")["bias_z"].as_f64().expect("z")
         })
         .collect();
     let deviation = (z.iter().map(|z| z * z).sum::<f64>() / f64::from(PAIRS)).sqrt();
@@ -68,24 +68,24 @@ fn seeds_that_differ_have_a_z_of_chance() {
 
 #[test]
 fn light_that_is_missing_is_no_chance() {
-    let desk = desk();
-    render(&desk, "path.exr", "--seed 1 --samples 1024");
-    render(&desk, "whitted.exr", "--seed 2 --samples 1024 --integrator whitted");
-    let told = compared(&desk, "whitted.exr", "path.exr");
+    let dir = dir();
+    render(&dir, "path.exr", "--seed 1 --samples 1024");
+    render(&dir, "whitted.exr", "--seed 2 --samples 1024 --integrator whitted");
+    let told = compared(&dir, "whitted.exr", "path.exr");
     let get = |key: &str| told[key].as_f64().expect(key);
     assert!(get("bias") < -0.05 && get("bias_z") < -10.0, "{told}");
     assert!((get("bias") / get("bias_standard_error") / get("bias_z") - 1.0).abs() < 1e-9, "{told}");
-    let table = desk.run("compare whitted.exr path.exr").stdout;
+    let table = dir.run("compare whitted.exr path.exr").stdout;
     assert!(String::from_utf8_lossy(&table).contains("\nbias, z "), "{}", String::from_utf8_lossy(&table));
 }
 
 #[test]
 fn what_has_no_noise_of_its_own_has_no_z() {
-    let desk = desk();
-    render(&desk, "path.exr", "--seed 1");
+    let dir = dir();
+    render(&dir, "path.exr", "--seed 1");
     for options in ["--samples 1", "--crop 0,0,12,16", "--view normal", "--view samples"] {
-        render(&desk, "other.exr", &format!("--seed 2 {options}"));
-        let told = compared(&desk, "other.exr", "path.exr");
+        render(&dir, "other.exr", &format!("--seed 2 {options}"));
+        let told = compared(&dir, "other.exr", "path.exr");
         assert_eq!(
             (&told["bias_standard_error"], &told["bias_z"]),
             (&Value::Null, &Value::Null),

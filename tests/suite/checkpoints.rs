@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use crate::desk::Desk;
-use crate::parts::{METHODS, ROOM, desk};
+use crate::test_dir::TestDir;
+use crate::parts::{METHODS, ROOM, dir};
 
 /// Random numbers below one.
 fn random(seed: u64) -> impl FnMut() -> f64 {
@@ -16,14 +16,14 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
     move || f64::from(next())
 }
 
-fn begin(desk: &Desk, line: &str) -> Child {
-    desk.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
+fn begin(dir: &TestDir, line: &str) -> Child {
+    dir.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
 }
 
 /// Runs it with an exit code; returns what it says as one line, as messages are wrapped.
 #[track_caller]
-fn said(desk: &Desk, line: &str, code: i32) -> String {
-    desk.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
+fn said(dir: &TestDir, line: &str, code: i32) -> String {
+    dir.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn end(mut child: Child, signal: Signal) -> Option<i32> {
@@ -32,9 +32,9 @@ fn end(mut child: Child, signal: Signal) -> Option<i32> {
 }
 
 /// No temporary file of a killed writer is left once somebody has written there again.
-fn assert_no_leftovers(desk: &Desk) {
+fn assert_no_leftovers(dir: &TestDir) {
     let names =
-        fs::read_dir(desk.0.path()).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+        fs::read_dir(dir.0.path()).expect("a folder").map(|entry| entry.expect("an entry").file_name());
     let left: Vec<_> = names.filter(|name| name.to_string_lossy().ends_with(".tmp")).collect();
     assert!(left.is_empty(), "{left:?}");
 }
@@ -60,31 +60,31 @@ fn killed_20_times_at_any_time() {
 
 /// Kills renders by each method at random times.
 fn kill_at_any_time(times: u32) {
-    let desk = desk();
+    let dir = dir();
     let mut next = random(3);
     for (method, options) in LONG {
-        desk.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
-        desk.write("out.exr", "the image before");
+        dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
+        dir.write("out.exr", "the image before");
         let line =
             format!("room.toml --once --progress none -o out.exr --resume --checkpoint 0.02 {options}");
         let mut kills = 0;
         while kills < times {
-            let child = begin(&desk, &line);
+            let child = begin(&dir, &line);
             std::thread::sleep(Duration::from_secs_f64(0.03 + 0.2 * next()));
             end(child, Signal::SIGKILL);
-            if desk.bytes("out.exr") == b"the image before" {
+            if dir.bytes("out.exr") == b"the image before" {
                 kills += 1;
                 continue;
             }
             // It was done: once more from the beginning.
-            assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method}: neither");
-            desk.write("out.exr", "the image before");
-            let _ = fs::remove_file(desk.path("out.exr.checkpoint"));
+            assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}: neither");
+            dir.write("out.exr", "the image before");
+            let _ = fs::remove_file(dir.path("out.exr.checkpoint"));
         }
-        desk.expect(&line, 0);
-        assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method}");
-        assert!(!desk.path("out.exr.checkpoint").exists(), "{method}: the render is done");
-        assert_no_leftovers(&desk);
+        dir.expect(&line, 0);
+        assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}");
+        assert!(!dir.path("out.exr.checkpoint").exists(), "{method}: the render is done");
+        assert_no_leftovers(&dir);
     }
 }
 
@@ -101,27 +101,27 @@ fn killed_200_times_while_it_writes_a_checkpoint() {
 
 /// Writes checkpoints all the time: the kill meets a write.
 fn kill_while_it_writes(times: u32) {
-    let desk = desk();
+    let dir = dir();
     let mut next = random(5);
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
     for number in 0..times {
-        let child = begin(&desk, line);
+        let child = begin(&dir, line);
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
         end(child, Signal::SIGKILL);
-        if desk.path("out.exr.checkpoint").exists() {
+        if dir.path("out.exr.checkpoint").exists() {
             // A whole one is of another seed; one that is not would be called damaged.
-            let said = self::said(&desk, "room.toml --once -o out.exr --seed 9 --resume", 2);
+            let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
             assert!(said.contains("seed is 0 there and 9 here"), "{number}: {said}");
         }
     }
-    assert!(desk.path("out.exr.checkpoint").exists());
+    assert!(dir.path("out.exr.checkpoint").exists());
 }
 
 /// Whether the machine is fast enough is no matter of the program's.
 #[test]
 #[ignore = "measures time, 84 s: cargo test --release --test suite hangup -- --ignored"]
 fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
-    let desk = desk();
+    let dir = dir();
     let is_over = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let load = std::thread::available_parallelism().map_or(2, usize::from);
     let busy = (0..load).map(|_| {
@@ -135,19 +135,19 @@ fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
     let busy: Vec<_> = busy.collect();
     for options in ["", "--integrator path", "--photons on --set photons.count=10000", "--error 0.001"] {
         let size = format!("--width 3840 --height 2160 --samples 100000 {options}");
-        let child = begin(&desk, &format!("room.toml --once --progress none -o out.exr {size}"));
+        let child = begin(&dir, &format!("room.toml --once --progress none -o out.exr {size}"));
         // Until every pixel has a sample.
         std::thread::sleep(Duration::from_secs(20));
         let sent = Instant::now();
         assert_eq!(end(child, Signal::SIGHUP), Some(129));
         let seconds = sent.elapsed().as_secs_f64();
-        let bytes = fs::metadata(desk.path("out.exr.checkpoint")).expect("a checkpoint").len();
+        let bytes = fs::metadata(dir.path("out.exr.checkpoint")).expect("a checkpoint").len();
         eprintln!("{options:?}: ended after {seconds:.2} s with a checkpoint of {} MB", bytes / 1_000_000);
         assert!(seconds < 2.0, "{options}: {seconds} s");
         // It is whole: what differs is found behind its digest.
-        let said = self::said(&desk, &format!("room.toml --once -o out.exr {size} --seed 9 --resume"), 2);
+        let said = self::said(&dir, &format!("room.toml --once -o out.exr {size} --seed 9 --resume"), 2);
         assert!(said.contains("seed is 0 there and 9 here"), "{said}");
-        fs::remove_file(desk.path("out.exr.checkpoint")).expect("removed");
+        fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
     }
     is_over.store(true, std::sync::atomic::Ordering::Relaxed);
     busy.into_iter().for_each(|thread| thread.join().expect("no panic"));
@@ -155,66 +155,66 @@ fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
 
 #[test]
 fn signals_leave_a_checkpoint_and_the_image_comes_out_the_same() {
-    let desk = desk();
+    let dir = dir();
     for ((method, options), (signal, code)) in LONG.into_iter().zip([
         (Signal::SIGTERM, 143),
         (Signal::SIGHUP, 129),
         (Signal::SIGINT, 130),
         (Signal::SIGTERM, 143),
     ]) {
-        desk.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
+        dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
         let line = format!("room.toml --once --progress none -o out.exr {options}");
-        let child = begin(&desk, &line);
+        let child = begin(&dir, &line);
         // Wait until there is something to keep: a signal before that leaves nothing.
         std::thread::sleep(Duration::from_millis(300));
         let ended = end(child, signal);
-        if desk.path("out.exr").exists() {
+        if dir.path("out.exr").exists() {
             // The machine was faster.
             assert_eq!(ended, Some(code).filter(|code| ended == Some(*code)).or(Some(0)));
         } else {
             assert_eq!(ended, Some(code), "{method}");
         }
-        desk.expect(&format!("{line} --resume"), 0);
-        assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method}");
-        fs::remove_file(desk.path("out.exr")).expect("removed");
+        dir.expect(&format!("{line} --resume"), 0);
+        assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}");
+        fs::remove_file(dir.path("out.exr")).expect("removed");
     }
 }
 
 /// A finished render whose checkpoint stays.
-fn kept(desk: &Desk, options: &str) {
-    desk.expect(&format!("room.toml --once --progress none -o out.exr --keep-checkpoint {options}"), 0);
-    assert!(desk.path("out.exr.checkpoint").exists());
+fn kept(dir: &TestDir, options: &str) {
+    dir.expect(&format!("room.toml --once --progress none -o out.exr --keep-checkpoint {options}"), 0);
+    assert!(dir.path("out.exr.checkpoint").exists());
 }
 
 #[test]
 fn a_finished_render_is_extended_to_the_pixels_of_a_longer_one() {
-    let desk = desk();
+    let dir = dir();
     for (method, options) in METHODS {
         let (head, samples) = options.split_once("--samples ").expect("samples");
         let (samples, rest) = samples.split_once(' ').unwrap_or((samples, ""));
         let samples: u32 = samples.parse().expect("a number");
         for before in [1, samples / 2, samples - 1].into_iter().filter(|before| *before > 0) {
-            kept(&desk, &format!("{head} --samples {before} {rest}"));
-            desk.expect(&format!("room.toml --once --progress none -o out.exr --resume {options}"), 0);
-            desk.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
-            assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method} after {before}");
-            assert!(!desk.path("out.exr.checkpoint").exists());
+            kept(&dir, &format!("{head} --samples {before} {rest}"));
+            dir.expect(&format!("room.toml --once --progress none -o out.exr --resume {options}"), 0);
+            dir.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
+            assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method} after {before}");
+            assert!(!dir.path("out.exr.checkpoint").exists());
         }
     }
-    kept(&desk, "--samples 8");
-    let said = self::said(&desk, "room.toml --once -o out.exr --resume --samples 4", 2);
+    kept(&dir, "--samples 8");
+    let said = self::said(&dir, "room.toml --once -o out.exr --resume --samples 4", 2);
     assert!(said.contains("it has more samples than the 4 that are asked for"), "{said}");
 }
 
 #[test]
 fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
-    let desk = desk();
-    kept(&desk, "");
-    let (image, checkpoint) = (desk.bytes("out.exr"), desk.bytes("out.exr.checkpoint"));
+    let dir = dir();
+    kept(&dir, "");
+    let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
     let refused = |options: &str, words: &str| {
-        let said = self::said(&desk, &format!("room.toml --once -o out.exr --resume {options}"), 2);
+        let said = self::said(&dir, &format!("room.toml --once -o out.exr --resume {options}"), 2);
         assert!(said.contains(words) && said.contains("out.exr.checkpoint"), "{options}: {said}");
-        assert!(desk.bytes("out.exr") == image);
+        assert!(dir.bytes("out.exr") == image);
     };
     refused("--seed 4", "seed is 0 there and 4 here");
     refused("--width 60", "width is 70 there and 60 here");
@@ -226,27 +226,27 @@ fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
         ("step.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
         ("tiles.ppm", "P3\n1 1\n255\n9 9 9\n"),
     ] {
-        let before = desk.bytes(name);
+        let before = dir.bytes(name);
         let changed =
             if name == "room.toml" { text.replace("[6, 5, 4]", "[6, 5, 5]") } else { text.to_owned() };
-        desk.write(name, changed);
+        dir.write(name, changed);
         refused("", if name == "room.toml" { "shapes, materials, lights or camera" } else { name });
-        desk.write(name, before);
+        dir.write(name, before);
     }
-    assert!(desk.bytes("out.exr.checkpoint") == checkpoint);
+    assert!(dir.bytes("out.exr.checkpoint") == checkpoint);
     // What does not change the picture is no other picture.
-    desk.write("room.toml", format!("# a comment\n{ROOM}\n[materials.unused]\n"));
-    desk.expect("room.toml --once --progress none -o out.exr --resume --threads 1 --keep-checkpoint", 0);
-    assert!(desk.bytes("out.exr") == image);
-    let said = desk.expect("room.toml --once -o out.exr --resume --set render.exposure=2", 0);
+    dir.write("room.toml", format!("# a comment\n{ROOM}\n[materials.unused]\n"));
+    dir.expect("room.toml --once --progress none -o out.exr --resume --threads 1 --keep-checkpoint", 0);
+    assert!(dir.bytes("out.exr") == image);
+    let said = dir.expect("room.toml --once -o out.exr --resume --set render.exposure=2", 0);
     assert!(said.contains("the checkpoint has all samples"), "{said}");
 }
 
 #[test]
 fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
-    let desk = desk();
-    kept(&desk, "");
-    let (image, checkpoint) = (desk.bytes("out.exr"), desk.bytes("out.exr.checkpoint"));
+    let dir = dir();
+    kept(&dir, "");
+    let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
     let mut next = random(8);
     for number in 0..40 {
         let index = (next() * checkpoint.len() as f64) as usize;
@@ -256,61 +256,61 @@ fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
         } else {
             bytes[index] ^= 1 << (number / 2 % 8);
         }
-        desk.write("out.exr.checkpoint", bytes);
-        let said = self::said(&desk, "room.toml --once -o out.exr --resume", 2);
+        dir.write("out.exr.checkpoint", bytes);
+        let said = self::said(&dir, "room.toml --once -o out.exr --resume", 2);
         assert!(said.contains("out.exr.checkpoint: "), "{said}");
-        assert!(desk.bytes("out.exr") == image);
+        assert!(dir.bytes("out.exr") == image);
     }
 }
 
 #[test]
 fn what_is_not_asked_for_is_said_and_not_done() {
-    let desk = desk();
-    let said = self::said(&desk, "room.toml --once -o out.exr --resume", 0);
+    let dir = dir();
+    let said = self::said(&dir, "room.toml --once -o out.exr --resume", 0);
     assert!(said.contains("there is no out.exr.checkpoint: starting from the beginning"), "{said}");
-    kept(&desk, "");
-    let said = self::said(&desk, "room.toml --once -o out.exr", 0);
+    kept(&dir, "");
+    let said = self::said(&dir, "room.toml --once -o out.exr", 0);
     assert!(said.contains("out.exr.checkpoint is of this picture, and is not used"), "{said}");
-    assert!(!desk.path("out.exr.checkpoint").exists(), "the picture is done");
+    assert!(!dir.path("out.exr.checkpoint").exists(), "the picture is done");
     // A render that took longer is not lost to one that was begun without --resume.
     let line = "room.toml --once --progress none -o out.exr --samples 100000";
-    let child = begin(&desk, line);
+    let child = begin(&dir, line);
     std::thread::sleep(Duration::from_millis(2500));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    let longer = desk.bytes("out.exr.checkpoint");
-    let child = begin(&desk, line);
+    let longer = dir.bytes("out.exr.checkpoint");
+    let child = begin(&dir, line);
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    assert!(desk.bytes("out.exr.checkpoint.before") == longer);
+    assert!(dir.bytes("out.exr.checkpoint.before") == longer);
     // Nor to another picture, which has less aside.
-    let child = begin(&desk, &format!("{line} --seed 5"));
+    let child = begin(&dir, &format!("{line} --seed 5"));
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    assert!(desk.bytes("out.exr.checkpoint.before") == longer);
-    fs::rename(desk.path("out.exr.checkpoint.before"), desk.path("out.exr.checkpoint")).expect("moved");
+    assert!(dir.bytes("out.exr.checkpoint.before") == longer);
+    fs::rename(dir.path("out.exr.checkpoint.before"), dir.path("out.exr.checkpoint")).expect("moved");
     // Nor to a draft that is done.
-    desk.expect("room.toml --once --progress none -o out.exr --samples 1", 0);
-    assert!(desk.bytes("out.exr.checkpoint") == longer);
-    fs::remove_file(desk.path("out.exr.checkpoint")).expect("removed");
+    dir.expect("room.toml --once --progress none -o out.exr --samples 1", 0);
+    assert!(dir.bytes("out.exr.checkpoint") == longer);
+    fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
     // One of another picture stays, as does what is no checkpoint.
-    kept(&desk, "");
-    desk.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
-    assert!(desk.path("out.exr.checkpoint").exists());
-    desk.write("out.exr.checkpoint", "notes of somebody");
-    let said = self::said(&desk, "room.toml --once -o out.exr --keep-checkpoint", 0);
+    kept(&dir, "");
+    dir.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
+    assert!(dir.path("out.exr.checkpoint").exists());
+    dir.write("out.exr.checkpoint", "notes of somebody");
+    let said = self::said(&dir, "room.toml --once -o out.exr --keep-checkpoint", 0);
     assert!(said.contains("the file of this name is no checkpoint"), "{said}");
-    assert_eq!(desk.bytes("out.exr.checkpoint"), b"notes of somebody");
-    let child = begin(&desk, "room.toml --once --progress none -o other.exr --samples 100000 --checkpoint 0");
+    assert_eq!(dir.bytes("out.exr.checkpoint"), b"notes of somebody");
+    let child = begin(&dir, "room.toml --once --progress none -o other.exr --samples 100000 --checkpoint 0");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    assert!(!desk.path("other.exr.checkpoint").exists(), "0 is never");
+    assert!(!dir.path("other.exr.checkpoint").exists(), "0 is never");
 }
 
 /// Waits until a file is there.
 #[track_caller]
-fn await_file(desk: &Desk, name: &str) {
+fn await_file(dir: &TestDir, name: &str) {
     let deadline = Instant::now() + Duration::from_secs(60);
-    while !desk.path(name).exists() {
+    while !dir.path(name).exists() {
         assert!(Instant::now() < deadline, "{name} does not come");
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -318,17 +318,17 @@ fn await_file(desk: &Desk, name: &str) {
 
 #[test]
 fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
-    let desk = desk();
+    let dir = dir();
     let line = "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05";
     let seed_is = |seed: u32| {
-        let said = self::said(&desk, "room.toml --once -o out.exr --seed 9 --resume", 2);
+        let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
         assert!(said.contains(&format!("seed is {seed} there and 9 here")), "{said}");
     };
-    let first = begin(&desk, &format!("{line} --seed 1"));
-    await_file(&desk, "out.exr.checkpoint");
+    let first = begin(&dir, &format!("{line} --seed 1"));
+    await_file(&dir, "out.exr.checkpoint");
     // Another render to the same image, and the same one once more, keep none, and say so once.
     for options in ["--seed 2", "--seed 1 --resume"] {
-        let mut second = desk.glimt(&format!("{line} {options}"));
+        let mut second = dir.glimt(&format!("{line} {options}"));
         let second = second.stderr(Stdio::piped()).spawn().expect("it runs");
         std::thread::sleep(Duration::from_millis(800));
         kill(Pid::from_raw(second.id() as i32), Signal::SIGTERM).expect("it runs");
@@ -342,26 +342,26 @@ fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
         seed_is(1);
     }
     // A finished image of the same render takes nothing away from it.
-    desk.expect("room.toml --once --progress none -o out.exr --samples 1 --seed 1", 0);
+    dir.expect("room.toml --once --progress none -o out.exr --samples 1 --seed 1", 0);
     seed_is(1);
-    assert!(!desk.path("out.exr.checkpoint.before").exists());
+    assert!(!dir.path("out.exr.checkpoint.before").exists());
     // What nobody keeps any more makes way.
     end(first, Signal::SIGKILL);
-    let child = begin(&desk, &format!("{line} --seed 2"));
-    await_file(&desk, "out.exr.checkpoint.before");
-    await_file(&desk, "out.exr.checkpoint");
+    let child = begin(&dir, &format!("{line} --seed 2"));
+    await_file(&dir, "out.exr.checkpoint.before");
+    await_file(&dir, "out.exr.checkpoint");
     end(child, Signal::SIGTERM);
     seed_is(2);
 }
 
 #[test]
 fn no_room_for_a_checkpoint_is_said_once_and_the_image_is_written() {
-    let desk = desk();
+    let dir = dir();
     // Blocks of 512 bytes: a checkpoint has 150 kB, the image 8.
     let limited = |blocks: u32, line: &str| {
-        let program = desk.glimt("").get_program().to_owned();
+        let program = dir.glimt("").get_program().to_owned();
         let mut shell = std::process::Command::new("sh");
-        shell.current_dir(desk.0.path());
+        shell.current_dir(dir.0.path());
         shell.arg("-c").arg(format!("ulimit -f {blocks}; exec \"$0\" {line}")).arg(program);
         let output = shell.output().expect("a shell");
         let text = String::from_utf8(output.stderr).expect("UTF-8");
@@ -374,64 +374,64 @@ fn no_room_for_a_checkpoint_is_said_once_and_the_image_is_written() {
     assert_eq!(said.to_lowercase().matches(why).count(), 1, "{said}");
     assert!(said.contains("wrote out.png"), "{said}");
     // No room for the image either.
-    desk.write("out.png", "the image before");
+    dir.write("out.png", "the image before");
     let (code, said) = limited(2, &format!("{line} -o out.png"));
     assert_eq!(code, Some(1), "{said}");
     assert_eq!(said.to_lowercase().matches(why).count(), 1, "{said}");
     assert!(said.to_lowercase().contains("error: cannot write out.png: file too large"), "{said}");
-    assert_eq!(desk.bytes("out.png"), b"the image before");
-    assert_no_leftovers(&desk);
+    assert_eq!(dir.bytes("out.png"), b"the image before");
+    assert_no_leftovers(&dir);
 }
 
 #[test]
 fn a_render_without_checkpoints_goes_on_from_one_all_the_same() {
-    let desk = desk();
-    kept(&desk, "--samples 2");
-    desk.expect("room.toml --once --progress none -o one.exr --samples 5", 0);
-    let said = self::said(&desk, "room.toml --once -o out.exr --samples 5 --resume --checkpoint 0", 0);
+    let dir = dir();
+    kept(&dir, "--samples 2");
+    dir.expect("room.toml --once --progress none -o one.exr --samples 5", 0);
+    let said = self::said(&dir, "room.toml --once -o out.exr --samples 5 --resume --checkpoint 0", 0);
     assert!(said.contains("going on from out.exr.checkpoint, after 2 samples"), "{said}");
-    assert!(desk.bytes("out.exr") == desk.bytes("one.exr"));
-    assert!(!desk.path("out.exr.checkpoint").exists());
+    assert!(dir.bytes("out.exr") == dir.bytes("one.exr"));
+    assert!(!dir.path("out.exr.checkpoint").exists());
 }
 
 #[test]
 fn a_pipe_in_the_place_of_a_checkpoint_or_a_part_holds_nothing_up() {
-    let desk = desk();
+    let dir = dir();
     for name in ["out.exr.checkpoint", "a.part"] {
-        nix::unistd::mkfifo(&desk.path(name), nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+        nix::unistd::mkfifo(&dir.path(name), nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     }
-    let said = self::said(&desk, "room.toml --once -o out.exr --keep-checkpoint", 0);
+    let said = self::said(&dir, "room.toml --once -o out.exr --keep-checkpoint", 0);
     assert!(said.contains("out.exr.checkpoint: the file of this name is no checkpoint"), "{said}");
-    self::said(&desk, "room.toml --once -o a.part --shard 1/2 --resume", 1);
-    self::said(&desk, "merge joined.exr a.part", 2);
+    self::said(&dir, "room.toml --once -o a.part --shard 1/2 --resume", 1);
+    self::said(&dir, "merge joined.exr a.part", 2);
 }
 
 #[test]
 fn a_checkpoint_of_another_version_makes_way_and_is_not_replaced() {
-    let desk = desk();
-    kept(&desk, "");
-    let mut newer = desk.bytes("out.exr.checkpoint");
+    let dir = dir();
+    kept(&dir, "");
+    let mut newer = dir.bytes("out.exr.checkpoint");
     newer[12] = 2;
-    desk.write("out.exr.checkpoint", &newer);
-    let child = begin(&desk, "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05");
-    await_file(&desk, "out.exr.checkpoint.before");
+    dir.write("out.exr.checkpoint", &newer);
+    let child = begin(&dir, "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05");
+    await_file(&dir, "out.exr.checkpoint.before");
     end(child, Signal::SIGKILL);
-    assert!(desk.bytes("out.exr.checkpoint.before") == newer);
+    assert!(dir.bytes("out.exr.checkpoint.before") == newer);
 }
 
 #[test]
 fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
-    let desk = desk();
+    let dir = dir();
     for options in
         ["--samples 5", "--photons on --samples 40 --set photons.count=500", "--samples 64 --error 0.2"]
     {
         let line = format!("room.toml --once -o a.part --shard 1/2 {options}");
-        desk.expect(&format!("{line} --progress none"), 0);
-        let part = desk.bytes("a.part");
-        let report = desk.report(&format!("{} --resume --progress none", line.replace(" --once", "")));
-        assert!(desk.bytes("a.part") == part, "{options}");
+        dir.expect(&format!("{line} --progress none"), 0);
+        let part = dir.bytes("a.part");
+        let report = dir.report(&format!("{} --resume --progress none", line.replace(" --once", "")));
+        assert!(dir.bytes("a.part") == part, "{options}");
         assert_eq!(report["counters"]["camera_rays"], 0, "{options}: nothing is rendered again");
-        let said = self::said(&desk, &format!("{line} --resume"), 0);
+        let said = self::said(&dir, &format!("{line} --resume"), 0);
         assert!(said.contains("a.part is finished already"), "{said}");
         for (other, words) in [
             ("--seed 4", "seed is 0 there and 4 here"),
@@ -440,40 +440,40 @@ fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
         ] {
             let line =
                 line.replace("--shard 1/2", if other.starts_with("--shard") { "" } else { "--shard 1/2" });
-            let said = self::said(&desk, &format!("{line} --resume {other}"), 2);
+            let said = self::said(&dir, &format!("{line} --resume {other}"), 2);
             assert!(said.contains(words) && said.contains("leave --resume out to replace it"), "{said}");
-            assert!(desk.bytes("a.part") == part, "{options} {other}");
+            assert!(dir.bytes("a.part") == part, "{options} {other}");
         }
         // One that is not whole is rendered again.
-        desk.write("a.part", &part[..part.len() / 2]);
-        let said = self::said(&desk, &format!("{line} --resume"), 0);
+        dir.write("a.part", &part[..part.len() / 2]);
+        let said = self::said(&dir, &format!("{line} --resume"), 0);
         assert!(said.contains("a.part is not used: it ends at byte"), "{said}");
-        assert!(desk.bytes("a.part") == part, "{options}");
-        fs::remove_file(desk.path("a.part")).expect("removed");
+        assert!(dir.bytes("a.part") == part, "{options}");
+        fs::remove_file(dir.path("a.part")).expect("removed");
     }
 }
 
 #[test]
 fn parts_have_checkpoints_too() {
-    let desk = desk();
+    let dir = dir();
     let options = "--photons on --samples 100 --set photons.count=2000";
-    desk.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
+    dir.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
     for index in 1..=2 {
         let line =
             format!("room.toml --once --progress none -o {index}.part --shard {index}/2 --resume {options}");
         for _ in 0..3 {
-            let child = begin(&desk, &format!("{line} --checkpoint 0.02"));
+            let child = begin(&dir, &format!("{line} --checkpoint 0.02"));
             std::thread::sleep(Duration::from_millis(150));
             end(child, Signal::SIGKILL);
         }
-        desk.expect(&line, 0);
+        dir.expect(&line, 0);
     }
-    desk.expect("merge joined.exr 1.part 2.part --progress none", 0);
-    assert!(desk.bytes("joined.exr") == desk.bytes("one.exr"));
+    dir.expect("merge joined.exr 1.part 2.part --progress none", 0);
+    assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
     // That of one part is none of another.
-    let child = begin(&desk, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
+    let child = begin(&dir, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    let said = self::said(&desk, "room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
+    let said = self::said(&dir, "room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
     assert!(said.contains("it is of part 1/2 and this call of part 2/2"), "{said}");
 }

@@ -6,7 +6,7 @@ use std::os::unix::fs::symlink;
 use image::{DynamicImage, ImageBuffer, Rgb, Rgb32FImage, RgbImage};
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const SIZE: (u32, u32) = (24, 16);
 
@@ -26,22 +26,22 @@ fn floats(value: impl Fn(u32, u32, u32) -> f32) -> Rgb32FImage {
     ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| value(x, y, c))))
 }
 
-/// A desk with the picture and its reference in every format that keeps their bytes, and in floats.
-fn desk() -> Desk {
-    let desk = Desk::new();
+/// A dir with the picture and its reference in every format that keeps their bytes, and in floats.
+fn dir() -> TestDir {
+    let dir = TestDir::new();
     for ending in ["png", "ppm", "tga", "bmp", "webp"] {
-        bytes(judged).save(desk.path(&format!("a.{ending}"))).expect("written");
-        bytes(reference).save(desk.path(&format!("b.{ending}"))).expect("written");
+        bytes(judged).save(dir.path(&format!("a.{ending}"))).expect("written");
+        bytes(reference).save(dir.path(&format!("b.{ending}"))).expect("written");
     }
-    floats(|x, y, c| f32::from(judged(x, y, c)) / 64.0).save(desk.path("a.exr")).expect("written");
-    floats(|x, y, c| f32::from(reference(x, y, c)) / 64.0).save(desk.path("b.exr")).expect("written");
-    desk
+    floats(|x, y, c| f32::from(judged(x, y, c)) / 64.0).save(dir.path("a.exr")).expect("written");
+    floats(|x, y, c| f32::from(reference(x, y, c)) / 64.0).save(dir.path("b.exr")).expect("written");
+    dir
 }
 
 /// Runs `glimt compare`; returns the object on stdout, and stderr.
 #[track_caller]
-fn json(desk: &Desk, line: &str, code: i32) -> (Value, String) {
-    let output = desk.run(&format!("compare --json {line}"));
+fn json(dir: &TestDir, line: &str, code: i32) -> (Value, String) {
+    let output = dir.run(&format!("compare --json {line}"));
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
     let stdout = String::from_utf8(output.stdout).expect("UTF-8");
@@ -77,9 +77,9 @@ fn assert_figures_of_bytes(object: &Value) {
 
 #[test]
 fn files_of_every_kind_give_the_figures_of_numpy() {
-    let desk = desk();
+    let dir = dir();
     for (a, b) in [("png", "png"), ("ppm", "tga"), ("bmp", "webp"), ("webp", "png")] {
-        let (object, stderr) = json(&desk, &format!("a.{a} b.{b}"), 0);
+        let (object, stderr) = json(&dir, &format!("a.{a} b.{b}"), 0);
         assert_figures_of_bytes(&object);
         assert_eq!((&object["a"], &object["b"]), (&format!("a.{a}").into(), &format!("b.{b}").into()));
         assert_eq!(stderr, "");
@@ -88,34 +88,34 @@ fn files_of_every_kind_give_the_figures_of_numpy() {
 
 #[test]
 fn sixteen_bits_and_floats_hold_the_same_picture() {
-    let desk = desk();
+    let dir = dir();
     let wide =
         ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| u16::from(judged(x, y, c)) * 257)));
-    DynamicImage::ImageRgb16(wide).save(desk.path("wide.png")).expect("written");
-    let (object, _) = json(&desk, "wide.png b.png", 0);
+    DynamicImage::ImageRgb16(wide).save(dir.path("wide.png")).expect("written");
+    let (object, _) = json(&dir, "wide.png b.png", 0);
     assert_figures_of_bytes(&object);
     let linear = |byte: u8| {
         let encoded = f64::from(byte) / 255.0;
         let linear = if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
         linear as f32
     };
-    floats(|x, y, c| linear(judged(x, y, c))).save(desk.path("linear.exr")).expect("written");
-    let (object, _) = json(&desk, "linear.exr b.png", 0);
+    floats(|x, y, c| linear(judged(x, y, c))).save(dir.path("linear.exr")).expect("written");
+    let (object, _) = json(&dir, "linear.exr b.png", 0);
     assert_figures_of_bytes(&object);
-    floats(|x, y, c| linear(judged(x, y, c))).save(desk.path("linear.hdr")).expect("written");
-    let (object, _) = json(&desk, "linear.hdr linear.exr", 0);
+    floats(|x, y, c| linear(judged(x, y, c))).save(dir.path("linear.hdr")).expect("written");
+    let (object, _) = json(&dir, "linear.hdr linear.exr", 0);
     assert!(object["relmse"].as_f64().expect("a number") < 1e-4, "8 bits of mantissa: {object}");
-    bytes(judged).save(desk.path("a.jpg")).expect("written");
-    let (object, _) = json(&desk, "a.jpg a.png", 0);
+    bytes(judged).save(dir.path("a.jpg")).expect("written");
+    let (object, _) = json(&dir, "a.jpg a.png", 0);
     assert!(object["psnr_db"].as_f64().expect("a number") > 10.0, "{object}");
 }
 
 #[test]
 fn values_of_float_files_are_taken_as_they_are() {
-    let desk = desk();
-    floats(|_, _, _| -0.5).save(desk.path("dark.exr")).expect("written");
-    floats(|_, _, _| 100.0).save(desk.path("bright.exr")).expect("written");
-    let (object, _) = json(&desk, "dark.exr bright.exr", 0);
+    let dir = dir();
+    floats(|_, _, _| -0.5).save(dir.path("dark.exr")).expect("written");
+    floats(|_, _, _| 100.0).save(dir.path("bright.exr")).expect("written");
+    let (object, _) = json(&dir, "dark.exr bright.exr", 0);
     assert_near(&object, "rmse", 100.5);
     assert_near(&object, "relmse", 100.5 * 100.5 / 10_000.01);
     assert_near(&object, "max", 100.5);
@@ -123,8 +123,8 @@ fn values_of_float_files_are_taken_as_they_are() {
 
 #[test]
 fn the_table_is_for_people() {
-    let desk = desk();
-    let output = desk.run("compare a.png b.png");
+    let dir = dir();
+    let output = dir.run("compare a.png b.png");
     assert_eq!(output.status.code(), Some(0));
     let stdout = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(output.stderr.is_empty());
@@ -147,106 +147,106 @@ fn the_table_is_for_people() {
 
 #[test]
 fn the_bound_decides_the_exit_code() {
-    let desk = desk();
-    let (object, stderr) = json(&desk, "a.png b.png --max-relmse 0.5", 0);
+    let dir = dir();
+    let (object, stderr) = json(&dir, "a.png b.png --max-relmse 0.5", 0);
     assert_eq!(
         (&object["is_within"], &object["max_relmse"], stderr.as_str()),
         (&true.into(), &0.5.into(), "")
     );
-    let (object, stderr) = json(&desk, "a.png b.png --max-relmse .4", 1);
+    let (object, stderr) = json(&dir, "a.png b.png --max-relmse .4", 1);
     assert_eq!(object["is_within"], false);
     assert_eq!(stderr, "error: relMSE is 0.421550, above the 0.4 of --max-relmse\n");
-    let copy = desk.bytes("b.png");
-    desk.write("copy.png", copy);
-    let (object, stderr) = json(&desk, "copy.png b.png --max-relmse 0", 0);
+    let copy = dir.bytes("b.png");
+    dir.write("copy.png", copy);
+    let (object, stderr) = json(&dir, "copy.png b.png --max-relmse 0", 0);
     assert_eq!(
         (object["relmse"].as_f64(), &object["psnr_db"], stderr.as_str()),
         (Some(0.0), &Value::Null, "")
     );
     assert_eq!((object["ssim"].as_f64(), object["flip"].as_f64()), (Some(1.0), Some(0.0)));
     for wrong in ["-1", "nan", "inf", "much"] {
-        let stderr = desk.expect(&format!("compare a.png b.png --max-relmse {wrong}"), 2);
+        let stderr = dir.expect(&format!("compare a.png b.png --max-relmse {wrong}"), 2);
         assert!(stderr.contains("expected a number that is not below 0"), "{stderr}");
     }
 }
 
 #[test]
 fn wrong_calls_and_files_are_told_in_words() {
-    let desk = desk();
-    desk.expect("compare a.png", 2);
-    desk.expect("compare a.png b.png a.ppm", 2);
-    let both = desk.expect("compare none.png ball.toml", 2);
+    let dir = dir();
+    dir.expect("compare a.png", 2);
+    dir.expect("compare a.png b.png a.ppm", 2);
+    let both = dir.expect("compare none.png ball.toml", 2);
     assert!(both.starts_with("error: cannot read none.png: no such file or directory\n"), "{both}");
     assert!(both.contains("error: ball.toml: its content is no image that can be read"), "{both}");
-    let whole = desk.bytes("a.png");
-    desk.write("cut.png", &whole[..whole.len() / 2]);
-    assert!(desk.expect("compare cut.png b.png", 2).contains("cut.png: "));
-    desk.write("empty.exr", "");
-    assert!(desk.expect("compare a.png empty.exr", 2).contains("empty.exr: the file is empty"));
-    assert!(desk.expect("compare . /dev/zero", 2).contains("it is a folder"));
-    RgbImage::new(3, 5).save(desk.path("small.png")).expect("written");
-    let sizes = desk.expect("compare small.png b.png", 2);
+    let whole = dir.bytes("a.png");
+    dir.write("cut.png", &whole[..whole.len() / 2]);
+    assert!(dir.expect("compare cut.png b.png", 2).contains("cut.png: "));
+    dir.write("empty.exr", "");
+    assert!(dir.expect("compare a.png empty.exr", 2).contains("empty.exr: the file is empty"));
+    assert!(dir.expect("compare . /dev/zero", 2).contains("it is a folder"));
+    RgbImage::new(3, 5).save(dir.path("small.png")).expect("written");
+    let sizes = dir.expect("compare small.png b.png", 2);
     assert!(sizes.starts_with("error: small.png has 3×5 pixels and b.png 24×16: "), "{sizes}");
     assert!(sizes.contains("--width"), "the way out: {sizes}");
 }
 
 #[test]
 fn values_that_are_not_finite_are_counted_and_placed() {
-    let desk = desk();
+    let dir = dir();
     let spoilt = |x, y, c| match (x, y, c) {
         (5, 3, 2) => f32::NAN,
         (6, 3, 0) => f32::INFINITY,
         (0, 9, _) => f32::NAN,
         _ => 0.5,
     };
-    floats(spoilt).save(desk.path("nan.exr")).expect("written");
-    let said = desk.expect("compare nan.exr b.exr --diff d.png", 2);
+    floats(spoilt).save(dir.path("nan.exr")).expect("written");
+    let said = dir.expect("compare nan.exr b.exr --diff d.png", 2);
     let words = "error: nan.exr: 4 of its values are NaN and 1 infinite, the first at pixel (5, 3), \
                  counted from (0, 0) at the top left, in blue: ";
     assert!(said.starts_with(words), "{said}");
-    assert!(!desk.path("d.png").exists());
+    assert!(!dir.path("d.png").exists());
 }
 
 #[test]
 fn one_file_twice_is_warned_of() {
-    let desk = desk();
-    symlink("a.png", desk.path("link.png")).expect("a link");
-    let (object, stderr) = json(&desk, "a.png a.png", 0);
+    let dir = dir();
+    symlink("a.png", dir.path("link.png")).expect("a link");
+    let (object, stderr) = json(&dir, "a.png a.png", 0);
     assert_eq!(object["rmse"].as_f64(), Some(0.0));
     assert!(stderr.starts_with("warning: a.png is given twice: there is no error"), "{stderr}");
-    let (_, stderr) = json(&desk, "link.png a.png", 0);
+    let (_, stderr) = json(&dir, "link.png a.png", 0);
     assert!(stderr.starts_with("warning: link.png and a.png are one file: "), "{stderr}");
 }
 
 #[test]
 fn the_error_is_written_as_a_picture() {
-    let desk = desk();
-    let (_, stderr) = json(&desk, "a.exr b.exr --diff d.exr", 0);
+    let dir = dir();
+    let (_, stderr) = json(&dir, "a.exr b.exr --diff d.exr", 0);
     assert_eq!(stderr, "wrote d.exr (|a - b| of each channel, linear)\n");
-    let diff = image::open(desk.path("d.exr")).expect("an EXR").into_rgb32f();
+    let diff = image::open(dir.path("d.exr")).expect("an EXR").into_rgb32f();
     let expected =
         floats(|x, y, c| (f32::from(judged(x, y, c)) / 64.0 - f32::from(reference(x, y, c)) / 64.0).abs());
     assert_eq!(diff, expected);
     for ending in ["png", "jpg", "ppm"] {
-        let (_, stderr) = json(&desk, &format!("a.png b.png --diff d.{ending}"), 0);
+        let (_, stderr) = json(&dir, &format!("a.png b.png --diff d.{ending}"), 0);
         assert!(stderr.starts_with(&format!("wrote d.{ending} (FLIP of each pixel: black 0, ")), "{stderr}");
-        let diff = image::open(desk.path(&format!("d.{ending}"))).expect("a picture");
+        let diff = image::open(dir.path(&format!("d.{ending}"))).expect("a picture");
         assert_eq!((diff.width(), diff.height()), SIZE);
     }
-    let diff = image::open(desk.path("d.png")).expect("a PNG").into_rgb8();
+    let diff = image::open(dir.path("d.png")).expect("a PNG").into_rgb8();
     assert!(diff.pixels().any(|pixel| pixel.0.iter().any(|byte| *byte > 40)), "errors are seen");
-    desk.write("copy.png", desk.bytes("b.png"));
-    json(&desk, "copy.png b.png --diff d.png", 0);
-    let black = image::open(desk.path("d.png")).expect("a PNG").into_rgb8();
+    dir.write("copy.png", dir.bytes("b.png"));
+    json(&dir, "copy.png b.png --diff d.png", 0);
+    let black = image::open(dir.path("d.png")).expect("a PNG").into_rgb8();
     assert!(black.pixels().all(|pixel| pixel.0 == [0; 3]), "no error is black");
 }
 
 #[test]
 fn the_error_is_never_written_over_a_picture_that_is_compared() {
-    let desk = desk();
-    symlink("a.png", desk.path("soft.png")).expect("a link");
-    fs::hard_link(desk.path("b.png"), desk.path("hard.png")).expect("a link");
-    let before = [desk.bytes("a.png"), desk.bytes("b.png")];
+    let dir = dir();
+    symlink("a.png", dir.path("soft.png")).expect("a link");
+    fs::hard_link(dir.path("b.png"), dir.path("hard.png")).expect("a link");
+    let before = [dir.bytes("a.png"), dir.bytes("b.png")];
     for (target, words) in [
         (
             "a.png",
@@ -256,27 +256,27 @@ fn the_error_is_never_written_over_a_picture_that_is_compared() {
         ("soft.png", "error: cannot write soft.png: it is a.png, one of"),
         ("hard.png", "error: cannot write hard.png: it is b.png, one of"),
     ] {
-        let stderr = desk.expect(&format!("compare a.png b.png --diff {target}"), 2);
+        let stderr = dir.expect(&format!("compare a.png b.png --diff {target}"), 2);
         assert!(stderr.starts_with(words), "{stderr}");
     }
-    assert_eq!([desk.bytes("a.png"), desk.bytes("b.png")], before);
+    assert_eq!([dir.bytes("a.png"), dir.bytes("b.png")], before);
 }
 
 #[test]
 fn where_the_error_cannot_be_written_is_told_before_the_work() {
-    let desk = desk();
-    let stderr = desk.expect("compare a.png b.png --diff d.gif", 2);
+    let dir = dir();
+    let stderr = dir.expect("compare a.png b.png --diff d.gif", 2);
     assert!(stderr.contains(".gif is not a format that glimt writes"), "{stderr}");
-    let stderr = desk.expect("compare none.png b.png --diff none/d.png", 1);
+    let stderr = dir.expect("compare none.png b.png --diff none/d.png", 1);
     assert!(stderr.contains("the directory none does not exist"), "{stderr}");
 }
 
 #[test]
 fn pictures_of_glimt_are_near_themselves_in_other_formats_and_other_seeds() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once --progress none -o a.exr -o a.png -o a.hdr --seed 1", 0);
-    desk.expect("ball.toml --once --progress none -o b.exr --seed 2", 0);
-    let relmse = |line: &str| json(&desk, line, 0).0["relmse"].as_f64().expect("a number");
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once --progress none -o a.exr -o a.png -o a.hdr --seed 1", 0);
+    dir.expect("ball.toml --once --progress none -o b.exr --seed 2", 0);
+    let relmse = |line: &str| json(&dir, line, 0).0["relmse"].as_f64().expect("a number");
     assert!(relmse("a.png a.exr") < 1e-3 && relmse("a.hdr a.exr") < 1e-3);
     assert!(relmse("b.exr a.exr") > relmse("a.hdr a.exr"), "another seed is other noise");
 }

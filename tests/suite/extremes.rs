@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const PHONG: &str = "type = \"phong\"\ndiffuse = [0.8, 0.2, 0.1]";
 const MIRROR: &str = "type = \"mirror\"\nreflectance = [1, 1, 1]";
@@ -36,16 +36,16 @@ fn lamp(position: &str, intensity: &str) -> String {
 /// Renders it, as a picture and as a float file; checks that every sample is finite.
 #[track_caller]
 fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -> serde_json::Value {
-    let desk = Desk::new();
-    desk.write(
+    let dir = TestDir::new();
+    dir.write(
         "a.obj",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 2 0 0\nv 0 1e-30 0\nf 1 2 3\nf 1 2 4\nf 1 2 6\n",
     );
-    desk.write(
+    dir.write(
         "a.toml",
         format!("[render]\n{render}\n[camera]\n{camera}\n[materials.m]\n{material}\n{rest}"),
     );
-    let report = desk.report("a.toml -o a.png -o a.exr");
+    let report = dir.report("a.toml -o a.png -o a.exr");
     assert_eq!(report["counters"]["non_finite_samples"], 0, "{name}");
     assert_eq!(report["image"]["complete"], true, "{name}");
     let bytes = report["peak_memory_bytes"].as_u64().expect("bytes");
@@ -211,25 +211,25 @@ fn is_made_on_demand(scene: &Path) -> bool {
 #[test]
 fn bundled_scenes_are_right_and_the_same_with_any_number_of_threads() {
     for scene in bundled().iter().filter(|scene| !is_made_on_demand(scene)) {
-        let desk = Desk::new();
+        let dir = TestDir::new();
         let path = scene.display();
         for integrator in ["whitted", "path"] {
             for threads in [1, 2, 7] {
                 let size = format!("--width 40 --height 30 --samples 3 --integrator {integrator}");
                 let outputs = format!("-o {threads}.png -o {threads}.exr");
-                let report = desk.report(&format!("{path} {size} {outputs} --threads {threads}"));
+                let report = dir.report(&format!("{path} {size} {outputs} --threads {threads}"));
                 assert_eq!(report["counters"]["non_finite_samples"], 0, "{path} by {integrator}");
                 assert_eq!(report["settings"]["threads"], threads, "{path}");
             }
             for ending in ["png", "exr"] {
-                let picture = |threads: u32| desk.bytes(&format!("{threads}.{ending}"));
+                let picture = |threads: u32| dir.bytes(&format!("{threads}.{ending}"));
                 assert!(
                     picture(1) == picture(2) && picture(1) == picture(7),
                     "{path} .{ending} by {integrator}"
                 );
             }
         }
-        let check = desk.run(&format!("check {path}"));
+        let check = dir.run(&format!("check {path}"));
         let (answer, said) = (String::from_utf8_lossy(&check.stdout), String::from_utf8_lossy(&check.stderr));
         assert!(answer.starts_with("ok: ") && said.is_empty(), "{answer}{said}");
     }

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command as Process;
 use std::time::{Duration, Instant};
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 
 /// Longest time of a refusal; it takes milliseconds, and a program that reads on takes minutes.
 const AT_ONCE: Duration = Duration::from_secs(10);
@@ -35,15 +35,15 @@ fn scene(file: &str) -> (String, &'static str) {
 
 /// Renders a scene, and checks that it is refused with all of these words.
 #[track_caller]
-fn refused(desk: &Desk, scene: &str, words: &[&str]) -> String {
-    desk.write("ball.png", "the old one");
+fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
+    dir.write("ball.png", "the old one");
     let start = Instant::now();
-    let stderr = desk.expect(&format!("{scene} --once -o ball.png"), 2);
+    let stderr = dir.expect(&format!("{scene} --once -o ball.png"), 2);
     assert!(start.elapsed() < AT_ONCE, "{scene}: {:?}", start.elapsed());
     for word in words {
         assert!(stderr.contains(word), "{scene}: {word:?} is missing in\n{stderr}");
     }
-    assert_eq!(desk.bytes("ball.png"), b"the old one", "{scene}");
+    assert_eq!(dir.bytes("ball.png"), b"the old one", "{scene}");
     stderr
 }
 
@@ -102,9 +102,9 @@ const KINDS: [&str; 9] =
 #[test]
 fn a_scene_that_is_no_file() {
     for what in KINDS {
-        let desk = Desk::new();
-        if let Some(words) = make(&desk.path("bad.toml"), what) {
-            let stderr = refused(&desk, "bad.toml", words);
+        let dir = TestDir::new();
+        if let Some(words) = make(&dir.path("bad.toml"), what) {
+            let stderr = refused(&dir, "bad.toml", words);
             assert!(stderr.contains("bad.toml"), "{what}: {stderr}");
         }
     }
@@ -114,12 +114,12 @@ fn a_scene_that_is_no_file() {
 fn an_asset_that_is_no_file() {
     for what in KINDS {
         for ending in ["obj", "off", "ply", "png", "jpg", "hdr", "exr", "txt"] {
-            let desk = Desk::new();
+            let dir = TestDir::new();
             let file = format!("bad.{ending}");
-            if let Some(words) = make(&desk.path(&file), what) {
+            if let Some(words) = make(&dir.path(&file), what) {
                 let (text, place) = scene(&file);
-                desk.write("scene.toml", text);
-                let stderr = refused(&desk, "scene.toml", words);
+                dir.write("scene.toml", text);
+                let stderr = refused(&dir, "scene.toml", words);
                 assert!(stderr.contains(&file), "{what}: {stderr}");
                 assert!(stderr.contains(&format!("scene.toml:{place}")), "{what} {ending}: {stderr}");
             }
@@ -142,47 +142,47 @@ fn an_asset_with_the_wrong_content() {
         ("exr", "the file is empty", "no image that can be read"),
         ("txt", "has a line `s size radius`", "bad.txt:1: this is a binary file of another kind"),
     ] {
-        let desk = Desk::new();
+        let dir = TestDir::new();
         let file = format!("bad.{ending}");
         let (text, place) = scene(&file);
-        desk.write("scene.toml", text);
+        dir.write("scene.toml", text);
         let place = format!("scene.toml:{place}");
-        desk.write(&file, "");
-        refused(&desk, "scene.toml", &[&file, empty, &place]);
+        dir.write(&file, "");
+        refused(&dir, "scene.toml", &[&file, empty, &place]);
         for bytes in [&noise, &zeros] {
-            desk.write(&file, bytes);
-            refused(&desk, "scene.toml", &[wrong, &place]);
+            dir.write(&file, bytes);
+            refused(&dir, "scene.toml", &[wrong, &place]);
         }
         // The start of a gigabyte of zeros is enough to refuse it.
-        let huge = File::create(desk.path(&file)).and_then(|file| file.set_len(1 << 30));
+        let huge = File::create(dir.path(&file)).and_then(|file| file.set_len(1 << 30));
         huge.expect("a sparse file");
-        refused(&desk, "scene.toml", &[&file, &place]);
+        refused(&dir, "scene.toml", &[&file, &place]);
     }
 }
 
 #[test]
 fn a_gigabyte_and_bytes_that_are_no_text_as_a_scene() {
-    let desk = Desk::new();
-    File::create(desk.path("huge.toml")).and_then(|file| file.set_len(1 << 30)).expect("a sparse file");
-    refused(&desk, "huge.toml", &["huge.toml", "larger than", "[[mesh]]"]);
-    desk.write("latin.toml", SCENE.replace("[0.8, 0.2, 0.1]", "0.8 # caf\u{e9}").replace('\u{e9}', "@"));
+    let dir = TestDir::new();
+    File::create(dir.path("huge.toml")).and_then(|file| file.set_len(1 << 30)).expect("a sparse file");
+    refused(&dir, "huge.toml", &["huge.toml", "larger than", "[[mesh]]"]);
+    dir.write("latin.toml", SCENE.replace("[0.8, 0.2, 0.1]", "0.8 # caf\u{e9}").replace('\u{e9}', "@"));
     let latin: Vec<u8> =
-        desk.bytes("latin.toml").iter().map(|&byte| if byte == b'@' { 0xe9 } else { byte }).collect();
-    desk.write("latin.toml", latin);
-    refused(&desk, "latin.toml", &["latin.toml:12:20", "0xe9", "UTF-8"]);
-    desk.write("deep.toml", format!("x = {}\n", "[".repeat(500_000)));
-    refused(&desk, "deep.toml", &["deep.toml:1:", "nested too deeply"]);
-    desk.write("zeros.toml", [0; 999]);
-    refused(&desk, "zeros.toml", &["zeros.toml", "binary file"]);
+        dir.bytes("latin.toml").iter().map(|&byte| if byte == b'@' { 0xe9 } else { byte }).collect();
+    dir.write("latin.toml", latin);
+    refused(&dir, "latin.toml", &["latin.toml:12:20", "0xe9", "UTF-8"]);
+    dir.write("deep.toml", format!("x = {}\n", "[".repeat(500_000)));
+    refused(&dir, "deep.toml", &["deep.toml:1:", "nested too deeply"]);
+    dir.write("zeros.toml", [0; 999]);
+    refused(&dir, "zeros.toml", &["zeros.toml", "binary file"]);
 }
 
 /// Checks that a mesh is refused with these words, at its place in the scene.
 #[track_caller]
 fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
-    let desk = Desk::new();
-    desk.write(name, content);
-    desk.write("scene.toml", scene(name).0);
-    let stderr = refused(&desk, "scene.toml", words);
+    let dir = TestDir::new();
+    dir.write(name, content);
+    dir.write("scene.toml", scene(name).0);
+    let stderr = refused(&dir, "scene.toml", words);
     assert!(stderr.contains("scene.toml:25:8") && stderr.contains(name), "{stderr}");
 }
 
@@ -217,31 +217,31 @@ fn meshes_that_cannot_be_used() {
 
 #[test]
 fn faces_that_cannot_be_used_are_counted_and_the_rest_is_rendered() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 1e999 1 1\n";
-    desk.write("a.obj", format!("{vertices}f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
-    desk.write("scene.toml", scene("a.obj").0);
-    let stderr = desk.expect("scene.toml --once -o a.png", 0);
+    dir.write("a.obj", format!("{vertices}f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
+    dir.write("scene.toml", scene("a.obj").0);
+    let stderr = dir.expect("scene.toml --once -o a.png", 0);
     let warning = "warning: a.obj: left out 2 faces with non-finite coordinates and 1 face without area";
     assert!(stderr.contains(warning) && stderr.contains("scene.toml:25:8"), "{stderr}");
-    assert_eq!(desk.report("scene.toml -o a.png")["counters"]["triangles"], 1);
+    assert_eq!(dir.report("scene.toml -o a.png")["counters"]["triangles"], 1);
 }
 
 #[test]
 fn material_files() {
     for what in KINDS {
-        let desk = Desk::new();
-        let Some(_) = make(&desk.path("bad.mtl"), what) else { continue };
-        desk.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
+        let dir = TestDir::new();
+        let Some(_) = make(&dir.path("bad.mtl"), what) else { continue };
+        dir.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
         let (text, _) = scene("a.obj");
         // The scene has a material for it: no warning.
-        desk.write("scene.toml", &text);
-        let stderr = desk.expect("scene.toml --once -o a.png", 0);
+        dir.write("scene.toml", &text);
+        let stderr = dir.expect("scene.toml --once -o a.png", 0);
         assert!(!stderr.contains("warning"), "{what}: {stderr}");
         // It has none.
-        desk.write("scene.toml", text.trim_end().trim_end_matches("material = \"ball\""));
+        dir.write("scene.toml", text.trim_end().trim_end_matches("material = \"ball\""));
         refused(
-            &desk,
+            &dir,
             "scene.toml",
             &["needs `material`: a.obj has no", "cannot read bad.mtl", "scene.toml:24:1"],
         );
@@ -251,11 +251,11 @@ fn material_files() {
         ("newmtl a\nKd 1 2\n", "bad.mtl:2: "),
         ("newmtl a\nNs nan\n", "bad.mtl:2: "),
     ] {
-        let desk = Desk::new();
-        desk.write("bad.mtl", content);
-        desk.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
-        desk.write("scene.toml", scene("a.obj").0);
-        refused(&desk, "scene.toml", &[words, "scene.toml:25:8"]);
+        let dir = TestDir::new();
+        dir.write("bad.mtl", content);
+        dir.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
+        dir.write("scene.toml", scene("a.obj").0);
+        refused(&dir, "scene.toml", &[words, "scene.toml:25:8"]);
     }
 }
 
@@ -275,10 +275,10 @@ fn pictures_that_lie_about_their_size() {
         ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 16000 +X 16000\nabc"),
         ("a.bmp", b"BM\0\0\0\0\0\0\0\0\x36\0\0\0\x28\0\0\0\xff\xff\xff\x7f\xff\xff\xff\x7f\x01\0\x18\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0"),
     ] {
-        let desk = Desk::new();
-        desk.write(name, content);
-        desk.write("scene.toml", scene("a.png").0.replace("a.png", name));
-        refused(&desk, "scene.toml", &[name, "scene.toml:25:8"]);
+        let dir = TestDir::new();
+        dir.write(name, content);
+        dir.write("scene.toml", scene("a.png").0.replace("a.png", name));
+        refused(&dir, "scene.toml", &[name, "scene.toml:25:8"]);
     }
 }
 
@@ -308,22 +308,22 @@ fn what_stands_beside_a_picture_takes_no_memory() {
         ("iTXt", encoded(plain(), Some(|encoder, text| encoder.add_itxt_chunk("a".to_owned(), text)))),
         ("tEXt", encoded(plain(), Some(|encoder, text| encoder.add_text_chunk("a".to_owned(), text)))),
     ] {
-        let desk = Desk::new();
-        desk.write("a.png", file);
-        desk.write("scene.toml", scene("a.png").0);
+        let dir = TestDir::new();
+        dir.write("a.png", file);
+        dir.write("scene.toml", scene("a.png").0);
         // By a shell: what a process took counts for the program that takes its place.
-        let program = desk.glimt("").get_program().to_owned();
+        let program = dir.glimt("").get_program().to_owned();
         let mut shell = Process::new("sh");
         let line = "\"$0\" scene.toml --once -o out.png --report report.json; exit $?";
         let status = shell
             .args(["-c", line])
             .arg(program)
-            .current_dir(desk.0.path())
+            .current_dir(dir.0.path())
             .output()
             .expect("it runs")
             .status;
         assert!(status.success(), "{name}: {status}");
-        let report: serde_json::Value = serde_json::from_slice(&desk.bytes("report.json")).expect("JSON");
+        let report: serde_json::Value = serde_json::from_slice(&dir.bytes("report.json")).expect("JSON");
         let bytes = report["peak_memory_bytes"].as_u64().expect("bytes");
         assert!(bytes < BOMB as u64 / 4, "{name}: {bytes}");
         assert_eq!(report["counters"]["texels_loaded"], 1, "{name}");
@@ -332,18 +332,18 @@ fn what_stands_beside_a_picture_takes_no_memory() {
 
 #[test]
 fn a_line_end_in_a_name_ends_no_line() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let run = |arguments: &[&str]| {
-        let mut process = desk.glimt("");
+        let mut process = dir.glimt("");
         process.args(arguments).output().expect("it runs")
     };
     let forged = |ending: &str| format!("a\nwrote forged.png\r\nerror: b{ending}");
     let (toml, png, obj) = (forged(".toml"), forged(".png"), forged(".obj"));
-    desk.write(&toml, SCENE);
+    dir.write(&toml, SCENE);
     let mesh = |file: &str| format!("{SCENE}\n[[mesh]]\nfile = {file:?}\n");
-    desk.write("wrong.toml", mesh("none\nforged.obj"));
-    desk.write("no_materials.toml", mesh(&obj));
-    desk.write(&obj, TRIANGLE);
+    dir.write("wrong.toml", mesh("none\nforged.obj"));
+    dir.write("no_materials.toml", mesh(&obj));
+    dir.write(&obj, TRIANGLE);
     for (arguments, code) in [
         (vec![toml.as_str(), "--once"], 0),
         (vec![&toml, "--once", "--progress", "plain"], 0),
@@ -393,20 +393,20 @@ fn assert_harmless(output: &std::process::Output, code: i32) {
 
 #[test]
 fn names_reach_the_terminal_without_teeth() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let toml: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     let run = |arguments: &[&str]| {
-        let mut process = desk.glimt("");
+        let mut process = dir.glimt("");
         process.args(arguments).output().expect("it runs")
     };
     let name = format!("{EVIL}.toml");
     // The scene's own path: missing, wrong, right.
     assert_harmless(&run(&[&name, "--once"]), 2);
-    desk.write(&name, "[render]\nwidth = 0\n");
+    dir.write(&name, "[render]\nwidth = 0\n");
     assert_harmless(&run(&[&name, "--once"]), 2);
     assert_harmless(&run(&["check", &name]), 2);
     assert_harmless(&run(&["new", &name]), 2);
-    desk.write(&name, SCENE);
+    dir.write(&name, SCENE);
     assert_harmless(&run(&[&name, "--once"]), 0);
     assert_harmless(&run(&[&name, "--once", "--progress", "plain"]), 0);
     assert_harmless(&run(&["check", &name]), 0);
@@ -426,7 +426,7 @@ fn names_reach_the_terminal_without_teeth() {
         ("position = [0, 1, 4]", format!("orbiter = \"{toml}.txt\"")),
         ("samples = 2", format!("output = \"{toml}.png\"\nwidth = 3 {EVIL}")),
     ] {
-        desk.write("ball.toml", SCENE.replace(from, &to));
+        dir.write("ball.toml", SCENE.replace(from, &to));
         assert_harmless(&run(&["ball.toml", "--once"]), 2);
     }
     // Names in meshes.
@@ -438,10 +438,10 @@ fn names_reach_the_terminal_without_teeth() {
         (format!("mtllib a.mtl\nusemtl a\n{TRIANGLE}"), format!("newmtl a\nKd {EVIL}\n")),
         (format!("v {EVIL} 0 0\n"), String::new()),
     ] {
-        desk.write("a.obj", obj);
-        desk.write("a.mtl", mtl);
+        dir.write("a.obj", obj);
+        dir.write("a.mtl", mtl);
         for material in ["", "material = \"ball\"\n"] {
-            desk.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"a.obj\"\n{material}"));
+            dir.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"a.obj\"\n{material}"));
             let output = run(&["ball.toml", "--once"]);
             let text = String::from_utf8_lossy(&output.stderr).into_owned();
             let harmful = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
@@ -453,13 +453,13 @@ fn names_reach_the_terminal_without_teeth() {
 
 #[test]
 fn a_path_that_is_no_text() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let name = std::ffi::OsStr::from_bytes(b"b\xff\x1b[2J.toml");
-    fs::write(desk.0.path().join(name), SCENE).expect("written");
-    let output = desk.glimt("--once").arg(name).output().expect("it runs");
+    fs::write(dir.0.path().join(name), SCENE).expect("written");
+    let output = dir.glimt("--once").arg(name).output().expect("it runs");
     let text = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(!text.contains('\u{1b}'), "{text:?}");
     let written = std::ffi::OsStr::from_bytes(b"b\xff\x1b[2J.png");
-    assert!(desk.0.path().join(written).is_file());
+    assert!(dir.0.path().join(written).is_file());
 }

@@ -2,13 +2,13 @@
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const SMALL: &str = "--once --width 16 --height 12 --samples 2";
 
 /// Text of `glimt info` on stdout.
-fn info(desk: &Desk, line: &str, code: i32) -> String {
-    let output = desk.run(&format!("info {line}"));
+fn info(dir: &TestDir, line: &str, code: i32) -> String {
+    let output = dir.run(&format!("info {line}"));
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
     String::from_utf8(output.stdout).expect("UTF-8")
@@ -16,15 +16,15 @@ fn info(desk: &Desk, line: &str, code: i32) -> String {
 
 #[test]
 fn every_format_says_how_it_was_made() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let outputs = ["a.png", "a.exr", "a.hdr", "a.jpg", "a.ppm"];
     let options: String = outputs.iter().map(|name| format!(" -o {name}")).collect();
-    desk.expect(&format!("ball.toml {SMALL} --seed 7 --crop 2,3,9,8{options}"), 0);
-    desk.expect(&format!("ball.toml {SMALL} --seed 7 --turntable 3 -o a.gif -o a.apng"), 0);
+    dir.expect(&format!("ball.toml {SMALL} --seed 7 --crop 2,3,9,8{options}"), 0);
+    dir.expect(&format!("ball.toml {SMALL} --seed 7 --turntable 3 -o a.gif -o a.apng"), 0);
     for name in outputs.iter().chain(&["a.gif", "a.apng"]) {
-        let text = info(&desk, name, 0);
+        let text = info(&dir, name, 0);
         assert!(text.starts_with(&format!("{name}: ")) && text.contains(", 16×12"), "{text}");
-        let json: Value = serde_json::from_str(&info(&desk, &format!("{name} --json"), 0)).expect("JSON");
+        let json: Value = serde_json::from_str(&info(&dir, &format!("{name} --json"), 0)).expect("JSON");
         assert_eq!((&json["width"], &json["height"]), (&16.into(), &12.into()), "{name}");
         assert_eq!(json["is_by_glimt"], true);
         let settings = &json["settings"];
@@ -36,37 +36,37 @@ fn every_format_says_how_it_was_made() {
             _ => assert_eq!((&settings["crop"], &settings["samples"]), (&"2,3,9,8".into(), &"2".into())),
         }
     }
-    let json: Value = serde_json::from_str(&info(&desk, "a.apng --json", 0)).expect("JSON");
+    let json: Value = serde_json::from_str(&info(&dir, "a.apng --json", 0)).expect("JSON");
     assert_eq!(json["frames"], 3);
     for name in ["a.gif", "a.apng"] {
-        let json: Value = serde_json::from_str(&info(&desk, &format!("{name} --json"), 0)).expect("JSON");
+        let json: Value = serde_json::from_str(&info(&dir, &format!("{name} --json"), 0)).expect("JSON");
         assert_eq!((&json["frames"], &json["settings"]["samples"]), (&3.into(), &"2".into()), "{name}");
     }
 }
 
 #[test]
 fn layers_and_parts_say_what_they_hold() {
-    let desk = Desk::new();
-    desk.expect(&format!("ball.toml {SMALL} -o a.exr --layers depth,samples"), 0);
-    let text = info(&desk, "a.exr", 0);
+    let dir = TestDir::new();
+    dir.expect(&format!("ball.toml {SMALL} -o a.exr --layers depth,samples"), 0);
+    let text = info(&dir, "a.exr", 0);
     assert!(text.contains("B G R depth.Z samples.X") && text.contains("depth,samples"), "{text}");
-    desk.expect(&format!("ball.toml {SMALL} -o 2.part --shard 2/3"), 0);
-    let text = info(&desk, "2.part", 0);
+    dir.expect(&format!("ball.toml {SMALL} -o 2.part --shard 2/3"), 0);
+    let text = info(&dir, "2.part", 0);
     assert!(text.starts_with("2.part: part 2 of 3, 16×12\n") && text.contains("integrator"), "{text}");
 }
 
 #[test]
 fn what_glimt_did_not_make_and_what_is_no_picture() {
-    let desk = Desk::new();
-    let text = info(&desk, "ball.toml", 2);
+    let dir = TestDir::new();
+    let text = info(&dir, "ball.toml", 2);
     assert!(text.is_empty());
-    let stderr = String::from_utf8(desk.run("info none.png").stderr).expect("UTF-8");
+    let stderr = String::from_utf8(dir.run("info none.png").stderr).expect("UTF-8");
     assert!(stderr.contains("cannot read none.png: no such file"), "{stderr}");
-    desk.write("d.png", foreign());
-    assert!(info(&desk, "d.png", 1).contains("unknown: the file does not tell"));
+    dir.write("d.png", foreign());
+    assert!(info(&dir, "d.png", 1).contains("unknown: the file does not tell"));
     // Names and values may hold what a terminal acts on.
-    desk.write("e.ppm", b"P6\n# glimt:scene: a\x1b[31mred\n1 1\n255\nabc");
-    assert!(!info(&desk, "e.ppm", 1).contains('\u{1b}'));
+    dir.write("e.ppm", b"P6\n# glimt:scene: a\x1b[31mred\n1 1\n255\nabc");
+    assert!(!info(&dir, "e.ppm", 1).contains('\u{1b}'));
 }
 
 /// A picture without texts.

@@ -6,7 +6,7 @@ use std::os::unix::fs::symlink;
 use glimt::system::machine::ProcessIdentity;
 use serde_json::json;
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 use super::gltf::Glb;
 
 /// A picture that glimt did not write: a red texel.
@@ -17,33 +17,33 @@ const ENDLESS: &str = "--once --samples 4000000000 --time 2";
 
 /// A ball with a texture, a mesh with a material file and its pictures, an orbiter camera, and a texture that no
 /// material uses.
-fn studio() -> Desk {
-    let desk = Desk::new();
-    fs::create_dir(desk.path("deep")).expect("a folder");
+fn studio() -> TestDir {
+    let dir = TestDir::new();
+    fs::create_dir(dir.path("deep")).expect("a folder");
     let camera = "orbiter = \"camera.txt\"\n";
     let scene = SCENE
         .replace("position = [0, 1, 4]\nlook_at = [0, 1, 0]\n", camera)
         .replace("[materials.ball]", &format!("{}\n[materials.ball]", TEXTURES))
         .replace("[0.8, 0.2, 0.1]", "{ texture = \"skin\" }");
-    desk.write("scene.toml", format!("{scene}\n[[mesh]]\nfile = \"deep/one.obj\"\n"));
+    dir.write("scene.toml", format!("{scene}\n[[mesh]]\nfile = \"deep/one.obj\"\n"));
     for name in ["skin.ppm", "unused.ppm", "deep/wood.ppm", "deep/bumps.ppm", "deep/alpha.ppm"] {
-        desk.write(name, PHOTOGRAPH);
+        dir.write(name, PHOTOGRAPH);
     }
-    desk.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
-    desk.write(
+    dir.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
+    dir.write(
         "deep/one.obj",
         "mtllib one.mtl materials.json gone.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n",
     );
-    desk.write("deep/materials.json", "newmtl other\n");
-    desk.write("deep/one.mtl", "newmtl m\nmap_Kd wood.ppm\nnorm bumps.ppm\nmap_d alpha.ppm\n");
-    desk
+    dir.write("deep/materials.json", "newmtl other\n");
+    dir.write("deep/one.mtl", "newmtl m\nmap_Kd wood.ppm\nnorm bumps.ppm\nmap_d alpha.ppm\n");
+    dir
 }
 
 const TEXTURES: &str = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.unused]\nfile = \"unused.ppm\"\n";
 
-/// Every file below the desk with its content; links are left out.
-fn everything(desk: &Desk) -> Vec<(std::path::PathBuf, Vec<u8>)> {
-    let mut folders = vec![desk.0.path().to_owned()];
+/// Every file below the dir with its content; links are left out.
+fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
+    let mut folders = vec![dir.0.path().to_owned()];
     let mut found = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).expect("a folder") {
@@ -63,51 +63,51 @@ fn everything(desk: &Desk) -> Vec<(std::path::PathBuf, Vec<u8>)> {
 /// Runs it and checks: exit code 2, these words in the message, nothing rendered, every file unchanged. Returns the
 /// message.
 #[track_caller]
-fn refused(desk: &Desk, line: &str, words: &[&str]) -> String {
-    let before = everything(desk);
-    let stderr = desk.expect(line, 2);
+fn refused(dir: &TestDir, line: &str, words: &[&str]) -> String {
+    let before = everything(dir);
+    let stderr = dir.expect(line, 2);
     for word in words {
         assert!(stderr.contains(word), "{line}: {word}: {stderr}");
     }
     assert!(!stderr.lines().any(|line| line.starts_with("render")), "{line}: {stderr}");
-    assert!(everything(desk) == before, "{line}: a file was changed: {stderr}");
+    assert!(everything(dir) == before, "{line}: a file was changed: {stderr}");
     stderr
 }
 
 #[test]
 fn the_default_output_is_no_input() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let texture = "[textures.marble]\nfile = \"marble.png\"\n\n[materials.ball]";
     let scene =
         SCENE.replace("[materials.ball]", texture).replace("[0.8, 0.2, 0.1]", "{ texture = \"marble\" }");
-    desk.write("marble.toml", scene);
+    dir.write("marble.toml", scene);
     // This picture was made by glimt: the default output could replace it, were it not an input.
-    desk.expect("ball.toml --once -o marble.png", 0);
-    let stderr = refused(&desk, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
+    dir.expect("ball.toml --once -o marble.png", 0);
+    let stderr = refused(&dir, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
     assert!(stderr.contains("marble.toml:11:8") && stderr.contains("`output = "), "{stderr}");
-    desk.expect("marble.toml --once -o other.png", 0);
+    dir.expect("marble.toml --once -o other.png", 0);
 }
 
 #[test]
 fn a_scene_by_the_name_of_its_picture_stays() {
-    let desk = Desk::new();
-    desk.write("scene.png", SCENE);
-    refused(&desk, &format!("scene.png {ENDLESS}"), &["scene.png", "the scene file", "-o"]);
-    symlink("ball.toml", desk.path("ln.png")).expect("a link");
-    refused(&desk, &format!("ball.toml {ENDLESS} -o ln.png"), &["ln.png", "ball.toml", "-o"]);
-    fs::hard_link(desk.path("ball.toml"), desk.path("hard.png")).expect("a link");
-    refused(&desk, &format!("ball.toml {ENDLESS} -o hard.png"), &["hard.png", "ball.toml"]);
+    let dir = TestDir::new();
+    dir.write("scene.png", SCENE);
+    refused(&dir, &format!("scene.png {ENDLESS}"), &["scene.png", "the scene file", "-o"]);
+    symlink("ball.toml", dir.path("ln.png")).expect("a link");
+    refused(&dir, &format!("ball.toml {ENDLESS} -o ln.png"), &["ln.png", "ball.toml", "-o"]);
+    fs::hard_link(dir.path("ball.toml"), dir.path("hard.png")).expect("a link");
+    refused(&dir, &format!("ball.toml {ENDLESS} -o hard.png"), &["hard.png", "ball.toml"]);
 }
 
 #[test]
 fn no_name_of_an_input_is_an_output() {
-    let desk = studio();
-    let skin = desk.path("skin.ppm");
-    symlink("skin.ppm", desk.path("link.ppm")).expect("a link");
-    symlink("link.ppm", desk.path("second.ppm")).expect("a link");
-    symlink(&skin, desk.path("deep/absolute.ppm")).expect("a link");
-    fs::hard_link(&skin, desk.path("hard.ppm")).expect("a link");
-    symlink("deep", desk.path("elsewhere")).expect("a link");
+    let dir = studio();
+    let skin = dir.path("skin.ppm");
+    symlink("skin.ppm", dir.path("link.ppm")).expect("a link");
+    symlink("link.ppm", dir.path("second.ppm")).expect("a link");
+    symlink(&skin, dir.path("deep/absolute.ppm")).expect("a link");
+    fs::hard_link(&skin, dir.path("hard.ppm")).expect("a link");
+    symlink("deep", dir.path("elsewhere")).expect("a link");
     for output in [
         "skin.ppm",
         "./skin.ppm",
@@ -119,25 +119,25 @@ fn no_name_of_an_input_is_an_output() {
         "hard.ppm",
         skin.to_str().expect("UTF-8"),
     ] {
-        refused(&desk, &format!("scene.toml {ENDLESS} -o {output}"), &[output, "skin.ppm", "texture `skin`"]);
-        refused(&desk, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
+        refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, "skin.ppm", "texture `skin`"]);
+        refused(&dir, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
     }
     // A folder by another name; `..` behind a link is where the link leads, and there is no skin.ppm.
     refused(
-        &desk,
+        &dir,
         &format!("scene.toml {ENDLESS} -o elsewhere/wood.ppm"),
         &["elsewhere/wood.ppm", "deep/wood.ppm"],
     );
-    fs::create_dir_all(desk.path("far/away")).expect("folders");
-    symlink("far/away", desk.path("near")).expect("a link");
-    desk.expect("scene.toml --once -o near/../skin.ppm", 0);
-    assert!(desk.bytes("far/skin.ppm").starts_with(b"P6\n# Software: glimt"));
-    assert_eq!(desk.bytes("skin.ppm"), PHOTOGRAPH);
+    fs::create_dir_all(dir.path("far/away")).expect("folders");
+    symlink("far/away", dir.path("near")).expect("a link");
+    dir.expect("scene.toml --once -o near/../skin.ppm", 0);
+    assert!(dir.bytes("far/skin.ppm").starts_with(b"P6\n# Software: glimt"));
+    assert_eq!(dir.bytes("skin.ppm"), PHOTOGRAPH);
 }
 
 #[test]
 fn every_kind_of_input_stays() {
-    let desk = studio();
+    let dir = studio();
     for (output, role) in [
         ("skin.ppm", "texture `skin`"),
         ("unused.ppm", "texture `unused`"),
@@ -146,7 +146,7 @@ fn every_kind_of_input_stays() {
         // The material file names these, though nothing looks them up.
         ("deep/alpha.ppm", "one.obj"),
     ] {
-        let stderr = refused(&desk, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
+        let stderr = refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
         assert!(stderr.contains("--> scene.toml:"), "{output}: where the scene names it: {stderr}");
     }
     for (report, role) in [
@@ -160,18 +160,18 @@ fn every_kind_of_input_stays() {
         // This file does not exist yet, and is read as soon as it does.
         ("deep/gone.mtl", "one.obj"),
     ] {
-        refused(&desk, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
-        refused(&desk, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
+        refused(&dir, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
+        refused(&dir, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
     }
     // Materials of the file that the scene replaces: still its pictures.
-    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
-    desk.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
-    refused(&desk, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
+    let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
+    dir.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
+    refused(&dir, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
 }
 
 #[test]
 fn every_picture_that_a_gltf_file_names_stays() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let mut glb = Glb::default();
     let positions = glb.vectors(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
     // An occlusion map, the picture of a material that no face has, and one that no texture has: none is looked up.
@@ -184,19 +184,19 @@ fn every_picture_that_a_gltf_file_names_stays() {
         "textures": [{"source": 0}, {"source": 1}],
         "images": [{"uri": "deep/ao.png"}, {"uri": "glow.png"}, {"uri": "spare%2Done.png"}],
     });
-    desk.write("m.glb", glb.finish(json));
-    fs::create_dir(desk.path("deep")).expect("a folder");
-    desk.write("scene.toml", format!("{SCENE}\n[[mesh]]\nfile = \"m.glb\"\n"));
-    desk.write(
+    dir.write("m.glb", glb.finish(json));
+    fs::create_dir(dir.path("deep")).expect("a folder");
+    dir.write("scene.toml", format!("{SCENE}\n[[mesh]]\nfile = \"m.glb\"\n"));
+    dir.write(
         "textured.toml",
         SCENE
             .replace("[materials.ball]", "[textures.t]\nfile = \"m.glb\"\nimage = 1\n[materials.ball]")
             .replace("[0.8, 0.2, 0.1]", "{ texture = \"t\" }"),
     );
-    desk.write("other.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    dir.write("other.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
     let pictures = ["deep/ao.png", "glow.png", "spare-one.png"];
     for picture in pictures {
-        desk.write(picture, PHOTOGRAPH);
+        dir.write(picture, PHOTOGRAPH);
     }
     for picture in pictures {
         for call in [
@@ -206,7 +206,7 @@ fn every_picture_that_a_gltf_file_names_stays() {
             "scene.toml --set mesh.1.file=other.off --set mesh.1.material=ball",
         ] {
             let stderr =
-                refused(&desk, &format!("{call} {ENDLESS} --force -o {picture}"), &[picture, "cannot write"]);
+                refused(&dir, &format!("{call} {ENDLESS} --force -o {picture}"), &[picture, "cannot write"]);
             assert!(stderr.contains("m.glb") || stderr.contains("the scene names"), "{call}: {stderr}");
         }
     }
@@ -214,24 +214,24 @@ fn every_picture_that_a_gltf_file_names_stays() {
 
 #[test]
 fn an_output_that_the_scene_names_is_compared_too() {
-    let desk = studio();
-    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
-    desk.write("scene.toml", text.replace("[render]", "[render]\noutput = \"deep/../skin.ppm\""));
+    let dir = studio();
+    let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
+    dir.write("scene.toml", text.replace("[render]", "[render]\noutput = \"deep/../skin.ppm\""));
     let words = ["deep/../skin.ppm", "texture `skin`", "--> scene.toml:", "`output`"];
-    refused(&desk, &format!("scene.toml {ENDLESS}"), &words);
-    let output = desk.run("check scene.toml");
+    refused(&dir, &format!("scene.toml {ENDLESS}"), &words);
+    let output = dir.run("check scene.toml");
     assert_eq!(output.status.code(), Some(2), "{output:?}");
-    desk.expect("scene.toml --once -o other.png", 0);
+    dir.expect("scene.toml --once -o other.png", 0);
 }
 
 #[test]
 fn outputs_and_the_report_are_files_of_their_own() {
-    let desk = Desk::new();
-    fs::create_dir_all(desk.path("o/p")).expect("folders");
-    symlink("o", desk.path("q")).expect("a link");
-    symlink("p/new.png", desk.path("o/dangling.png")).expect("a link");
-    desk.write("there.png", PHOTOGRAPH);
-    fs::hard_link(desk.path("there.png"), desk.path("hard.png")).expect("a link");
+    let dir = TestDir::new();
+    fs::create_dir_all(dir.path("o/p")).expect("folders");
+    symlink("o", dir.path("q")).expect("a link");
+    symlink("p/new.png", dir.path("o/dangling.png")).expect("a link");
+    dir.write("there.png", PHOTOGRAPH);
+    fs::hard_link(dir.path("there.png"), dir.path("hard.png")).expect("a link");
     for line in [
         "-o a.png -o ./a.png",
         "-o a.png -o o/../a.png",
@@ -247,156 +247,156 @@ fn outputs_and_the_report_are_files_of_their_own() {
     ] {
         let names = line.split_whitespace().filter(|word| !word.starts_with('-'));
         let names: Vec<&str> = names.skip_while(|name| *name == "b.png").collect();
-        let stderr = refused(&desk, &format!("ball.toml {ENDLESS} {line}"), &names);
+        let stderr = refused(&dir, &format!("ball.toml {ENDLESS} {line}"), &names);
         assert!(stderr.contains("one file") || stderr.contains("is given twice"), "{line}: {stderr}");
     }
-    desk.expect("ball.toml --once -o o/a.png -o a.png --report o/p/a.png.json", 0);
+    dir.expect("ball.toml --once -o o/a.png -o a.png --report o/p/a.png.json", 0);
 }
 
 #[test]
 fn by_default_only_a_picture_of_glimt_is_replaced() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once", 0);
-    let own = desk.bytes("ball.png");
-    desk.expect("ball.toml --once --seed 3", 0);
-    assert_ne!(desk.bytes("ball.png"), own, "its own picture is replaced");
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once", 0);
+    let own = dir.bytes("ball.png");
+    dir.expect("ball.toml --once --seed 3", 0);
+    assert_ne!(dir.bytes("ball.png"), own, "its own picture is replaced");
     let ways = ["ball.png", "-o", "`output = "];
     let truncated = &own[..20];
     let mut other = own.clone();
     let at = other.windows(6).position(|window| window == b"glimt ").expect("its name");
     other[at] = b'G';
     for foreign in [PHOTOGRAPH, b"", b"\x89PNG\r\n\x1a\n", truncated, SCENE.as_bytes(), &other] {
-        desk.write("ball.png", foreign);
-        refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
+        dir.write("ball.png", foreign);
+        refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     }
     // As any encoder writes it, without glimt's text.
-    image::RgbImage::new(3, 2).save(desk.path("ball.png")).expect("a photograph");
-    refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
-    desk.write("photo.png", desk.bytes("ball.png"));
-    fs::remove_file(desk.path("ball.png")).expect("removed");
-    symlink("photo.png", desk.path("ball.png")).expect("a link");
-    refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
+    image::RgbImage::new(3, 2).save(dir.path("ball.png")).expect("a photograph");
+    refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
+    dir.write("photo.png", dir.bytes("ball.png"));
+    fs::remove_file(dir.path("ball.png")).expect("removed");
+    symlink("photo.png", dir.path("ball.png")).expect("a link");
+    refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     // An explicit output is meant.
-    desk.expect("ball.toml --once -o ball.png", 0);
-    assert_eq!(desk.bytes("photo.png").len(), own.len());
-    desk.expect("ball.toml --once", 0);
-    fs::remove_file(desk.path("photo.png")).expect("removed");
-    desk.expect("ball.toml --once", 0);
-    assert_eq!(desk.bytes("photo.png"), own, "a link to a file that is not there yet");
+    dir.expect("ball.toml --once -o ball.png", 0);
+    assert_eq!(dir.bytes("photo.png").len(), own.len());
+    dir.expect("ball.toml --once", 0);
+    fs::remove_file(dir.path("photo.png")).expect("removed");
+    dir.expect("ball.toml --once", 0);
+    assert_eq!(dir.bytes("photo.png"), own, "a link to a file that is not there yet");
     let scene = SCENE.replace("[render]", "[render]\noutput = \"own.png\"");
-    desk.write("ball.toml", scene);
-    desk.write("own.png", PHOTOGRAPH);
-    desk.expect("ball.toml --once", 0);
-    assert!(desk.bytes("own.png").starts_with(b"\x89PNG"));
+    dir.write("ball.toml", scene);
+    dir.write("own.png", PHOTOGRAPH);
+    dir.expect("ball.toml --once", 0);
+    assert!(dir.bytes("own.png").starts_with(b"\x89PNG"));
 }
 
 #[test]
 fn a_report_replaces_reports_and_nothing_else() {
-    let desk = Desk::new();
-    let report = |name: &str| desk.expect(&format!("ball.toml --once --report {name}"), 0);
+    let dir = TestDir::new();
+    let report = |name: &str| dir.expect(&format!("ball.toml --once --report {name}"), 0);
     for name in ["new", "new", "new.txt", "new.txt", "r.json"] {
         report(name);
     }
-    desk.write("empty", "");
+    dir.write("empty", "");
     report("empty");
     for (name, content) in [("m.obj", b"v 0 0 0\n".as_slice()), ("notes", b"glimt"), ("x.ppm", PHOTOGRAPH)] {
-        desk.write(name, content);
-        refused(&desk, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
+        dir.write(name, content);
+        refused(&dir, &format!("ball.toml {ENDLESS} --report {name}"), &[name, ".json"]);
     }
     // A stream is appended to.
-    desk.write("log", "before\n");
-    let log = fs::OpenOptions::new().append(true).open(desk.path("log")).expect("a file");
-    let status = desk.glimt("ball.toml --once --report /dev/stdout").stdout(log).status().expect("it runs");
-    assert!(status.success() && desk.bytes("log").starts_with(b"before\n{"));
-    let scene = fs::OpenOptions::new().append(true).open(desk.path("ball.toml")).expect("a file");
-    let status = desk.glimt("ball.toml --once --report /dev/stdout").stdout(scene).status().expect("it runs");
-    assert_eq!((status.code(), desk.bytes("ball.toml")), (Some(2), SCENE.into()));
+    dir.write("log", "before\n");
+    let log = fs::OpenOptions::new().append(true).open(dir.path("log")).expect("a file");
+    let status = dir.glimt("ball.toml --once --report /dev/stdout").stdout(log).status().expect("it runs");
+    assert!(status.success() && dir.bytes("log").starts_with(b"before\n{"));
+    let scene = fs::OpenOptions::new().append(true).open(dir.path("ball.toml")).expect("a file");
+    let status = dir.glimt("ball.toml --once --report /dev/stdout").stdout(scene).status().expect("it runs");
+    assert_eq!((status.code(), dir.bytes("ball.toml")), (Some(2), SCENE.into()));
 }
 
 #[test]
 fn an_input_by_the_name_of_a_temporary_file_stays() {
-    let desk = studio();
-    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
+    let dir = studio();
+    let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     let mut ended = std::process::Command::new("true").spawn().expect("true starts");
     let (machine, process) = (ProcessIdentity::current().machine, ended.id());
     ended.wait().expect("it ends");
     let [scene, camera, stale] =
         ["s", "c", "a"].map(|name| format!(".{name}.glimt-{machine:016x}-{process}-2.tmp"));
     let (scene, camera, stale) = (scene.as_str(), camera.as_str(), stale.as_str());
-    desk.write(scene, text.replace("camera.txt", camera));
-    desk.write(camera, desk.bytes("camera.txt"));
-    desk.write(stale, "left behind");
-    desk.expect(&format!("{scene} --once -o a.png --report r.json"), 0);
-    assert!(desk.path(scene).exists() && desk.path(camera).exists());
-    assert!(!desk.path(stale).exists(), "others are removed");
+    dir.write(scene, text.replace("camera.txt", camera));
+    dir.write(camera, dir.bytes("camera.txt"));
+    dir.write(stale, "left behind");
+    dir.expect(&format!("{scene} --once -o a.png --report r.json"), 0);
+    assert!(dir.path(scene).exists() && dir.path(camera).exists());
+    assert!(!dir.path(stale).exists(), "others are removed");
 }
 
 #[test]
 fn new_takes_the_place_of_nothing() {
-    let desk = Desk::new();
-    symlink("nowhere.toml", desk.path("dangling.toml")).expect("a link");
-    symlink("ball.toml", desk.path("link.toml")).expect("a link");
-    fs::create_dir(desk.path("folder.toml")).expect("a folder");
+    let dir = TestDir::new();
+    symlink("nowhere.toml", dir.path("dangling.toml")).expect("a link");
+    symlink("ball.toml", dir.path("link.toml")).expect("a link");
+    fs::create_dir(dir.path("folder.toml")).expect("a folder");
     for name in ["dangling.toml", "link.toml", "folder.toml", "deep/../ball.toml", "ball.toml"] {
-        fs::create_dir_all(desk.path("deep")).expect("a folder");
-        refused(&desk, &format!("new {name}"), &[name, "left as it is"]);
+        fs::create_dir_all(dir.path("deep")).expect("a folder");
+        refused(&dir, &format!("new {name}"), &[name, "left as it is"]);
     }
-    assert!(!desk.path("nowhere.toml").exists());
-    assert!(fs::symlink_metadata(desk.path("dangling.toml")).expect("a link").is_symlink());
-    let stderr = desk.expect("new dangling.toml", 2);
+    assert!(!dir.path("nowhere.toml").exists());
+    assert!(fs::symlink_metadata(dir.path("dangling.toml")).expect("a link").is_symlink());
+    let stderr = dir.expect("new dangling.toml", 2);
     assert!(stderr.contains("symbolic link"), "{stderr}");
 }
 
 #[test]
 fn the_map_of_an_environment_is_no_output() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     // One map is read, and one is only named: a black factor needs no map.
     for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
-        desk.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
-        desk.write("sky.ppm", PHOTOGRAPH);
+        dir.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
+        dir.write("sky.ppm", PHOTOGRAPH);
         let said = refused(
-            &desk,
+            &dir,
             &format!("{name} {ENDLESS} -o sky.ppm"),
             &["sky.ppm", "the map of the environment"],
         );
         assert!(said.contains(name), "{said}");
-        let checked = desk.glimt(&format!("check {name}")).output().expect("it runs");
+        let checked = dir.glimt(&format!("check {name}")).output().expect("it runs");
         let counted = String::from_utf8_lossy(&checked.stdout).into_owned();
         let lights = if color.is_empty() { "2 lights" } else { "1 light" };
         assert!(counted.contains("1 texture") && counted.contains(lights), "{counted}");
     }
-    fs::remove_file(desk.path("sky.ppm")).expect("removed");
-    let missing = desk.expect("check lit.toml", 2);
+    fs::remove_file(dir.path("sky.ppm")).expect("removed");
+    let missing = dir.expect("check lit.toml", 2);
     assert!(missing.contains("there is no file") && missing.contains("sky.ppm"), "{missing}");
-    desk.write("sky.ppm", "P6 no picture");
+    dir.write("sky.ppm", "P6 no picture");
     for call in ["check lit.toml", "check dark.toml", "lit.toml --once"] {
-        assert!(desk.expect(call, 2).contains("sky.ppm"), "{call}");
+        assert!(dir.expect(call, 2).contains("sky.ppm"), "{call}");
     }
 }
 
 #[test]
 fn files_that_the_call_replaces_stay_inputs_of_the_scene() {
-    let desk = studio();
-    desk.write("other.ppm", PHOTOGRAPH);
-    desk.write("deep/two.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    desk.write("other.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
+    let dir = studio();
+    dir.write("other.ppm", PHOTOGRAPH);
+    dir.write("deep/two.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    dir.write("other.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 1\nf 40 4 3\n");
     for (set, output) in [
         ("textures.skin.file=other.ppm", "skin.ppm"),
         ("textures.skin={file=\"other.ppm\"}", "skin.ppm"),
         ("mesh.1.file=deep/two.obj --set mesh.1.material=ball", "deep/wood.ppm"),
         ("textures.skin.file=other.ppm", "other.ppm"),
     ] {
-        refused(&desk, &format!("scene.toml {ENDLESS} --set {set} -o {output}"), &[output]);
+        refused(&dir, &format!("scene.toml {ENDLESS} --set {set} -o {output}"), &[output]);
     }
     for (set, report) in [
         ("camera.orbiter=other.txt", "camera.txt"),
         ("mesh.1.file=deep/two.obj --set mesh.1.material=ball", "deep/one.obj"),
     ] {
-        refused(&desk, &format!("scene.toml {ENDLESS} --set {set} --report {report}"), &[report, "--report"]);
+        refused(&dir, &format!("scene.toml {ENDLESS} --set {set} --report {report}"), &[report, "--report"]);
     }
     // By default, over a texture that glimt has made.
-    desk.expect("scene.toml --once --samples 1 -o made.png", 0);
-    let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
-    desk.write("made.toml", text.replace("unused.ppm", "made.png"));
-    refused(&desk, "made.toml --once --set textures.unused.file=other.ppm", &["made.png"]);
+    dir.expect("scene.toml --once --samples 1 -o made.png", 0);
+    let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
+    dir.write("made.toml", text.replace("unused.ppm", "made.png"));
+    refused(&dir, "made.toml --once --set textures.unused.file=other.ppm", &["made.png"]);
 }

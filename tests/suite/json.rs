@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 
 /// C1, DEL, a turn of the writing's direction, a joiner, a tag above the basic plane, an umlaut.
 const NAME: &str = "a\u{9b}31m\u{7f}\u{202e}b\u{200d}c\u{e0041}ä\u{1}.toml";
@@ -22,17 +22,17 @@ fn object(text: &str) -> Value {
     serde_json::from_str(text).expect(text)
 }
 
-fn run(desk: &Desk, arguments: &[&str]) -> std::process::Output {
-    let output = desk.glimt("").args(arguments).output().expect("it runs");
+fn run(dir: &TestDir, arguments: &[&str]) -> std::process::Output {
+    let output = dir.glimt("").args(arguments).output().expect("it runs");
     assert!(output.status.success(), "{arguments:?}: {:?}", String::from_utf8_lossy(&output.stderr));
     output
 }
 
 #[test]
 fn every_json_is_valid_and_harmless() {
-    let desk = Desk::new();
-    desk.write(NAME, SCENE);
-    let output = run(&desk, &[NAME, "--once", "--report", "-", "--progress", "json"]);
+    let dir = TestDir::new();
+    dir.write(NAME, SCENE);
+    let output = run(&dir, &[NAME, "--once", "--report", "-", "--progress", "json"]);
     let report = object(harmless(&output.stdout));
     assert_eq!(report["scene"], NAME);
     assert!(harmless(&output.stdout).contains('ä'), "what is harmless is written as it is");
@@ -41,27 +41,27 @@ fn every_json_is_valid_and_harmless() {
     let picture = NAME.replace(".toml", ".png");
     assert_eq!(written["path"], picture);
 
-    run(&desk, &[NAME, "--once", "--report", "r.json"]);
-    assert_eq!(object(harmless(&desk.bytes("r.json")))["scene"], NAME);
+    run(&dir, &[NAME, "--once", "--report", "r.json"]);
+    assert_eq!(object(harmless(&dir.bytes("r.json")))["scene"], NAME);
 
-    let output = run(&desk, &["check", "--json", NAME]);
+    let output = run(&dir, &["check", "--json", NAME]);
     assert_eq!(object(harmless(&output.stdout))["scene"], NAME);
 
-    let output = run(&desk, &["compare", "--json", &picture, &picture]);
+    let output = run(&dir, &["compare", "--json", &picture, &picture]);
     assert_eq!(object(harmless(&output.stdout))["a"], picture);
 }
 
 #[test]
 fn what_bench_writes_of_an_odd_name_is_json_and_xml() {
-    let desk = Desk::new();
-    desk.write(NAME, SCENE);
+    let dir = TestDir::new();
+    dir.write(NAME, SCENE);
     let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache \
                 --progress json --json a.json --plot a.svg";
     let arguments: Vec<&str> = ["bench", NAME].into_iter().chain(line.split_whitespace()).collect();
-    let output = run(&desk, &arguments);
+    let output = run(&dir, &arguments);
     harmless(&output.stderr).lines().for_each(|line| drop(object(line)));
-    assert_eq!(object(harmless(&desk.bytes("a.json")))["scenes"][0]["scene"], NAME);
-    let plot = desk.bytes("a.svg");
+    assert_eq!(object(harmless(&dir.bytes("a.json")))["scenes"][0]["scene"], NAME);
+    let plot = dir.bytes("a.svg");
     let document = roxmltree::Document::parse(harmless(&plot)).expect("XML");
     let is_named =
         |node: roxmltree::Node<'_, '_>| node.text().is_some_and(|text| text.contains("ä␁.toml, 8×"));
@@ -70,10 +70,10 @@ fn what_bench_writes_of_an_odd_name_is_json_and_xml() {
 
 #[test]
 fn check_says_as_json_what_it_says_in_words() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let scene = SCENE.replace("width", "widht").replace("radius", "raduis");
-    desk.write("ball.toml", format!("# ä\n{scene}"));
-    let output = desk.run("check ball.toml --json --set render.samples=0");
+    dir.write("ball.toml", format!("# ä\n{scene}"));
+    let output = dir.run("check ball.toml --json --set render.samples=0");
     assert_eq!(output.status.code(), Some(2));
     assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
     let report = object(harmless(&output.stdout));
@@ -94,9 +94,9 @@ fn check_says_as_json_what_it_says_in_words() {
 
 #[test]
 fn check_of_a_scene_with_warnings_is_right_and_lists_them() {
-    let desk = Desk::new();
-    desk.write("ball.toml", format!("{SCENE}[materials.unused]\n"));
-    let output = run(&desk, &["check", "--json", "ball.toml"]);
+    let dir = TestDir::new();
+    dir.write("ball.toml", format!("{SCENE}[materials.unused]\n"));
+    let output = run(&dir, &["check", "--json", "ball.toml"]);
     let report = object(harmless(&output.stdout));
     assert_eq!(report["ok"], true);
     let [warning] = report["diagnostics"].as_array().expect("a list").as_slice() else { panic!("{report}") };

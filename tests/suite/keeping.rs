@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::Path;
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 
 /// A file of somebody else whose name has the ending of a report.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
@@ -20,25 +20,25 @@ const SHORT: &str =
 
 #[test]
 fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let refused = |foreign: &[u8]| {
-        desk.write("package.json", foreign);
-        let stderr = desk.expect(&format!("ball.toml {ENDLESS} --report package.json"), 2);
+        dir.write("package.json", foreign);
+        let stderr = dir.expect(&format!("ball.toml {ENDLESS} --report package.json"), 2);
         assert!(
             stderr.contains(
                 "cannot write package.json: the file of this name is not a report that glimt wrote"
             ) && stderr.contains("--force replaces it"),
             "{stderr}"
         );
-        assert_eq!(desk.bytes("package.json"), foreign);
+        assert_eq!(dir.bytes("package.json"), foreign);
     };
     for foreign in [PACKAGE, BY_HAND, "[1, 2]", "{}", "{\"glimt\": \"0.1.0\", \"scene\": \"a\"", "text"] {
         refused(foreign.as_bytes());
     }
-    desk.run(&format!("bench ball.toml {SHORT} --json results.json"));
-    refused(&desk.bytes("results.json"));
-    desk.expect("ball.toml --once --report package.json --force", 0);
-    let mut report: serde_json::Value = serde_json::from_slice(&desk.bytes("package.json")).expect("JSON");
+    dir.run(&format!("bench ball.toml {SHORT} --json results.json"));
+    refused(&dir.bytes("results.json"));
+    dir.expect("ball.toml --once --report package.json --force", 0);
+    let mut report: serde_json::Value = serde_json::from_slice(&dir.bytes("package.json")).expect("JSON");
     // glimt replaces its own report without asking: as it is; with the keys of the contract alone, sorted and in one
     // line; and an empty file.
     let as_it_is = report.to_string();
@@ -49,37 +49,37 @@ fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
     keys.insert("glimt".to_owned(), "0.0.1".into());
     let all = [as_it_is, report.to_string(), String::new()];
     for own in all {
-        desk.write("package.json", own);
-        desk.expect("ball.toml --once --report package.json", 0);
+        dir.write("package.json", own);
+        dir.expect("ball.toml --once --report package.json", 0);
     }
-    desk.expect("ball.toml --once --report /dev/null", 0);
-    let output = desk.run("ball.toml --once --report -");
+    dir.expect("ball.toml --once --report /dev/null", 0);
+    let output = dir.run("ball.toml --once --report -");
     serde_json::from_slice::<serde_json::Value>(&output.stdout).expect("a report on stdout");
 }
 
 #[test]
 fn force_replaces_no_input() {
-    let desk = Desk::new();
-    let stderr = desk.expect(&format!("ball.toml {ENDLESS} --report ball.toml --force"), 2);
+    let dir = TestDir::new();
+    let stderr = dir.expect(&format!("ball.toml {ENDLESS} --report ball.toml --force"), 2);
     assert!(stderr.contains("it is the scene file"), "{stderr}");
-    desk.write("ball.png", "a photograph");
-    let stderr = desk.expect(&format!("ball.toml {ENDLESS}"), 2);
+    dir.write("ball.png", "a photograph");
+    let stderr = dir.expect(&format!("ball.toml {ENDLESS}"), 2);
     assert!(stderr.contains("--force replaces it"), "{stderr}");
-    desk.expect("ball.toml --once --force", 0);
-    assert!(desk.bytes("ball.png").starts_with(b"\x89PNG"));
+    dir.expect("ball.toml --once --force", 0);
+    assert!(dir.bytes("ball.png").starts_with(b"\x89PNG"));
 }
 
 #[test]
 fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let bench = |line: &str, code: i32| {
-        let output = desk.run(&format!("bench ball.toml {line}"));
+        let output = dir.run(&format!("bench ball.toml {line}"));
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
         stderr
     };
     let refused = |option: &str, name: &str, foreign: &str| {
-        desk.write(name, foreign);
+        dir.write(name, foreign);
         let stderr = bench(&format!("{LONG} {option} {name}"), 2);
         let what = match option {
             "--json" => "a file of results",
@@ -91,10 +91,10 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
              name another file with {option} FILE, or --force replaces it\n"
         );
         assert_eq!(stderr, expected);
-        assert_eq!(desk.bytes(name), foreign.as_bytes());
+        assert_eq!(dir.bytes(name), foreign.as_bytes());
     };
-    desk.expect("ball.toml --once --report report.json", 0);
-    let report = String::from_utf8(desk.bytes("report.json")).expect("UTF-8");
+    dir.expect("ball.toml --once --report report.json", 0);
+    let report = String::from_utf8(dir.bytes("report.json")).expect("UTF-8");
     let described = "<svg width=\"8\" height=\"8\" xmlns=\"http://www.w3.org/2000/svg\">\n<desc>glimt ";
     for (option, name, foreign) in [
         ("--json", "a.json", PACKAGE),
@@ -110,20 +110,20 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
     let all = "--json a.json --csv a.csv --plot a.svg";
     bench(&format!("{SHORT} {all} --force"), 0);
     // The same with a column more, or another end of the line.
-    let table = String::from_utf8(desk.bytes("a.csv")).expect("UTF-8");
+    let table = String::from_utf8(dir.bytes("a.csv")).expect("UTF-8");
     let (head, lines) = table.split_once("\r\n").expect("a first line");
     refused("--csv", "b.csv", &format!("{head},note\r\n{lines}"));
     refused("--csv", "b.csv", &format!("{head}\n{lines}"));
     // The same with the words of somebody else before glimt's.
-    let plot = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
+    let plot = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     refused("--plot", "b.svg", &plot.replacen("<desc>", "<desc>somebody, with </desc>\n<desc>", 1));
     bench(&format!("{SHORT} {all}"), 0);
     // A plot of a version that did not sign it.
-    let plot = String::from_utf8(desk.bytes("a.svg")).expect("UTF-8");
+    let plot = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     let (start, rest) = plot.split_once("<desc>").expect("a signature");
     let (_, end) = rest.split_once("</desc>").expect("its end");
-    desk.write("a.svg", format!("{start}{end}"));
-    desk.write("a.csv", "");
+    dir.write("a.svg", format!("{start}{end}"));
+    dir.write("a.csv", "");
     bench(&format!("{SHORT} {all}"), 0);
 }
 
@@ -131,19 +131,19 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
 #[test]
 fn an_owner_that_cannot_be_kept_is_said() {
     use std::os::unix::process::CommandExt;
-    let desk = Desk::new();
-    if fs::metadata(desk.0.path()).expect("a folder").uid() != 0 {
+    let dir = TestDir::new();
+    if fs::metadata(dir.0.path()).expect("a folder").uid() != 0 {
         return eprintln!("skipped: only root can become another user");
     }
-    let program = desk.program();
-    fs::set_permissions(desk.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
+    let program = dir.program();
+    fs::set_permissions(dir.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
     for (name, mode) in [("a.png", 0o666), ("b.png", 0o666)] {
-        desk.write(name, "");
-        fs::set_permissions(desk.path(name), fs::Permissions::from_mode(mode)).expect("permitted");
+        dir.write(name, "");
+        fs::set_permissions(dir.path(name), fs::Permissions::from_mode(mode)).expect("permitted");
     }
     let run = |line: &str| {
         let mut process = std::process::Command::new(&program);
-        process.current_dir(desk.0.path()).args(line.split_whitespace()).uid(65534).gid(65534);
+        process.current_dir(dir.0.path()).args(line.split_whitespace()).uid(65534).gid(65534);
         let output = process.output().expect("it runs");
         assert!(output.status.success(), "{output:?}");
         String::from_utf8(output.stderr).expect("UTF-8")
@@ -151,7 +151,7 @@ fn an_owner_that_cannot_be_kept_is_said() {
     let words = "warning: a.png: its owner and its group could not be kept";
     let stderr = run("ball.toml --once -o a.png");
     assert!(stderr.contains(words), "{stderr}");
-    assert_eq!(fs::metadata(desk.path("a.png")).expect("a file").uid(), 65534);
+    assert_eq!(fs::metadata(dir.path("a.png")).expect("a file").uid(), 65534);
     assert!(!run("ball.toml --once -o a.png").contains("could not be kept"), "it is its own now");
     let events = run("ball.toml --once -o b.png --progress json");
     let done = events.lines().last().expect("the end");
@@ -180,10 +180,10 @@ fn attribute(path: &Path, name: &str) -> Option<Vec<u8>> {
 
 #[test]
 fn a_picture_keeps_the_access_list_and_the_attributes_of_the_file_that_it_replaces() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once -o a.png --report a.json", 0);
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once -o a.png --report a.json", 0);
     for name in ["a.png", "a.json"] {
-        let path = desk.path(name);
+        let path = dir.path(name);
         // A file system without them has nothing to lose.
         if xattr::set(&path, "user.note", b"mine").is_err() {
             return;
@@ -191,9 +191,9 @@ fn a_picture_keeps_the_access_list_and_the_attributes_of_the_file_that_it_replac
         fs::set_permissions(&path, fs::Permissions::from_mode(0o600)).expect("permitted");
         xattr::set(&path, ACCESS, &access_list(6, 0, 6)).expect("a list");
     }
-    desk.expect("ball.toml --once -o a.png --report a.json --seed 3", 0);
+    dir.expect("ball.toml --once -o a.png --report a.json --seed 3", 0);
     for name in ["a.png", "a.json"] {
-        let path = desk.path(name);
+        let path = dir.path(name);
         assert_eq!(attribute(&path, "user.note").as_deref(), Some(b"mine".as_slice()), "{name}");
         assert_eq!(attribute(&path, ACCESS), Some(access_list(6, 0, 6)), "{name}");
         // With a list, these are the mask: without it, they would be rights of the group.
@@ -203,53 +203,53 @@ fn a_picture_keeps_the_access_list_and_the_attributes_of_the_file_that_it_replac
 
 #[test]
 fn a_folder_s_default_list_gives_a_replaced_file_no_more_rights_than_it_had() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once -o a.png", 0);
-    fs::set_permissions(desk.path("a.png"), fs::Permissions::from_mode(0o640)).expect("permitted");
-    if xattr::set(desk.0.path(), "system.posix_acl_default", &access_list(6, 4, 6)).is_err() {
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once -o a.png", 0);
+    fs::set_permissions(dir.path("a.png"), fs::Permissions::from_mode(0o640)).expect("permitted");
+    if xattr::set(dir.0.path(), "system.posix_acl_default", &access_list(6, 4, 6)).is_err() {
         return;
     }
-    desk.expect("ball.toml --once -o a.png --seed 3", 0);
-    assert_eq!(attribute(&desk.path("a.png"), ACCESS), None);
-    assert_eq!(fs::metadata(desk.path("a.png")).expect("a file").mode() & 0o777, 0o640);
-    desk.expect("ball.toml --once -o new.png", 0);
-    assert!(attribute(&desk.path("new.png"), ACCESS).is_some(), "a new file has the folder's");
+    dir.expect("ball.toml --once -o a.png --seed 3", 0);
+    assert_eq!(attribute(&dir.path("a.png"), ACCESS), None);
+    assert_eq!(fs::metadata(dir.path("a.png")).expect("a file").mode() & 0o777, 0o640);
+    dir.expect("ball.toml --once -o new.png", 0);
+    assert!(attribute(&dir.path("new.png"), ACCESS).is_some(), "a new file has the folder's");
 }
 
 #[test]
 fn scenes_of_one_name_do_not_share_a_default_image() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for folder in ["a", "b"] {
-        std::fs::create_dir(desk.path(folder)).expect("made");
-        desk.write(&format!("{folder}/scene.toml"), SCENE);
+        std::fs::create_dir(dir.path(folder)).expect("made");
+        dir.write(&format!("{folder}/scene.toml"), SCENE);
     }
-    desk.expect("a/scene.toml --once --samples 1", 0);
-    let first = desk.bytes("scene.png");
-    let said = desk.expect("b/scene.toml --once --samples 1", 2);
+    dir.expect("a/scene.toml --once --samples 1", 0);
+    let first = dir.bytes("scene.png");
+    let said = dir.expect("b/scene.toml --once --samples 1", 2);
     assert!(
         said.contains("cannot write scene.png: it is the image of another scene, a/scene.toml"),
         "{said}"
     );
     assert!(said.contains("-o") && said.contains("--force"), "{said}");
-    assert_eq!(desk.bytes("scene.png"), first);
+    assert_eq!(dir.bytes("scene.png"), first);
     // The same scene by another name, and from another folder by the absolute one.
-    desk.expect("./b/../a/scene.toml --once --samples 2", 0);
-    let absolute = desk.path("a/scene.toml");
-    desk.expect(&format!("{} --once --samples 1", absolute.display()), 0);
-    assert_eq!(desk.bytes("scene.png"), first);
+    dir.expect("./b/../a/scene.toml --once --samples 2", 0);
+    let absolute = dir.path("a/scene.toml");
+    dir.expect(&format!("{} --once --samples 1", absolute.display()), 0);
+    assert_eq!(dir.bytes("scene.png"), first);
     for way_out in ["-o b.png", "--force", "-o scene.png"] {
-        desk.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
+        dir.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
     }
     // Turntables have their names checked, too.
-    desk.expect("a/scene.toml --once --samples 1 --turntable 2", 0);
-    let said = desk.expect("b/scene.toml --once --samples 1 --turntable 2", 2);
+    dir.expect("a/scene.toml --once --samples 1 --turntable 2", 0);
+    let said = dir.expect("b/scene.toml --once --samples 1 --turntable 2", 2);
     assert!(said.contains("another scene, a/scene.toml"), "{said}");
     // Both are moved together.
-    std::fs::create_dir(desk.path("moved")).expect("made");
-    desk.expect("a/scene.toml --once --samples 1 --force", 0);
+    std::fs::create_dir(dir.path("moved")).expect("made");
+    dir.expect("a/scene.toml --once --samples 1 --force", 0);
     for name in ["a", "scene.png"] {
-        std::fs::rename(desk.path(name), desk.path(&format!("moved/{name}"))).expect("moved");
+        std::fs::rename(dir.path(name), dir.path(&format!("moved/{name}"))).expect("moved");
     }
-    let moved = desk.glimt("a/scene.toml --once --samples 2").current_dir(desk.path("moved")).output();
+    let moved = dir.glimt("a/scene.toml --once --samples 2").current_dir(dir.path("moved")).output();
     assert_eq!(moved.expect("it runs").status.code(), Some(0));
 }

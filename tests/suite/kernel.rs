@@ -9,7 +9,7 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::Vec3;
 
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 
 /// Random numbers in [0, 1).
 struct Random(u64);
@@ -333,14 +333,14 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
 #[test]
 fn all_instructions_make_the_same_picture() {
     for scene in ["mesh", "textures", "orbiter", "dof"] {
-        let desk = Desk::new();
+        let dir = TestDir::new();
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
         let picture = |instructions: &str| {
             let name = format!("{instructions}.exr");
             let line = format!("{path} --once --width 96 --height 72 --samples 2 -o {name} --progress none");
-            let output = desk.glimt(&line).env("GLIMT_SIMD", instructions).output().expect("it runs");
+            let output = dir.glimt(&line).env("GLIMT_SIMD", instructions).output().expect("it runs");
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-            desk.bytes(&name)
+            dir.bytes(&name)
         };
         let portable = picture("portable");
         assert!(portable == picture("avx2") && portable == picture("avx512"), "{scene}");

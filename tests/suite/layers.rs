@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use exr::prelude::{ReadChannels, ReadLayers, read};
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const SMALL: &str = "--once --width 32 --height 24";
 
@@ -17,36 +17,36 @@ const ROOM: &str = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 0.6, 0]\n[envi
     [[sphere]]\ncenter = [-0.9, 0.5, 0]\nradius = 0.5\nmaterial = \"mirror\"\n\
     [[sphere]]\ncenter = [0, 2.5, 1]\nradius = 0.3\nmaterial = \"lamp\"\n";
 
-fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.write("room.toml", ROOM);
-    desk
+fn dir() -> TestDir {
+    let dir = TestDir::new();
+    dir.write("room.toml", ROOM);
+    dir
 }
 
 /// All channels of an EXR file.
-fn channels(desk: &Desk, name: &str) -> BTreeMap<String, Vec<f32>> {
+fn channels(dir: &TestDir, name: &str) -> BTreeMap<String, Vec<f32>> {
     let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
-    let image = image.all_attributes().from_file(desk.path(name)).expect("EXR");
+    let image = image.all_attributes().from_file(dir.path(name)).expect("EXR");
     let list = image.layer_data.channel_data.list.into_iter();
     list.map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect())).collect()
 }
 
-fn picture(desk: &Desk, options: &str) -> Vec<f32> {
-    desk.expect(&format!("room.toml {SMALL} -o view.exr {options}"), 0);
-    image::open(desk.path("view.exr")).expect("a picture").to_rgb32f().into_raw()
+fn picture(dir: &TestDir, options: &str) -> Vec<f32> {
+    dir.expect(&format!("room.toml {SMALL} -o view.exr {options}"), 0);
+    image::open(dir.path("view.exr")).expect("a picture").to_rgb32f().into_raw()
 }
 
 /// The parts add up to the picture, also where noise decides the samples of each pixel, and with photons.
 #[test]
 fn parts_add_up_to_the_picture() {
-    let desk = desk();
+    let dir = dir();
     for options in [
         "--integrator path --samples 64 --error 0.2",
         "--integrator whitted --photons on --samples 5",
         "--integrator whitted --samples 4 --time 0.2",
     ] {
-        desk.expect(&format!("room.toml {SMALL} {options} -o a.exr --layers all"), 0);
-        let all = channels(&desk, "a.exr");
+        dir.expect(&format!("room.toml {SMALL} {options} -o a.exr --layers all"), 0);
+        let all = channels(&dir, "a.exr");
         for channel in ["R", "G", "B"] {
             let parts =
                 ["ambient", "diffuse", "specular", "emission"].map(|part| &all[&format!("{part}.{channel}")]);
@@ -65,10 +65,10 @@ fn parts_add_up_to_the_picture() {
 
 #[test]
 fn layers_are_the_views_and_the_picture_is_that_without_them() {
-    let desk = desk();
+    let dir = dir();
     let same = "--samples 4 --error 0 --integrator path";
-    desk.expect(&format!("room.toml {SMALL} {same} -o a.exr --layers depth,albedo,normal,variance"), 0);
-    let all = channels(&desk, "a.exr");
+    dir.expect(&format!("room.toml {SMALL} {same} -o a.exr --layers depth,albedo,normal,variance"), 0);
+    let all = channels(&dir, "a.exr");
     let names: Vec<&str> = all.keys().map(String::as_str).collect();
     let expected = [
         "B",
@@ -88,11 +88,11 @@ fn layers_are_the_views_and_the_picture_is_that_without_them() {
         let expected: Vec<f32> = pixels.chunks(3).map(|pixel| pixel[component]).collect();
         assert_eq!(all[name], expected, "{name}");
     };
-    let beauty = picture(&desk, same);
+    let beauty = picture(&dir, same);
     ["R", "G", "B"].iter().enumerate().for_each(|(i, name)| is(name, &beauty, i));
-    is("depth.Z", &picture(&desk, &format!("{same} --view depth")), 0);
-    is("albedo.G", &picture(&desk, &format!("{same} --view albedo")), 1);
-    let error = picture(&desk, &format!("{same} --view error"));
+    is("depth.Z", &picture(&dir, &format!("{same} --view depth")), 0);
+    is("albedo.G", &picture(&dir, &format!("{same} --view albedo")), 1);
+    let error = picture(&dir, &format!("{same} --view error"));
     for (variance, error) in all["variance.X"].iter().zip(error.chunks(3)) {
         assert!((variance - error[0] * error[0]).abs() <= 1e-6 * variance, "{variance} {}", error[0]);
     }
@@ -105,7 +105,7 @@ fn layers_are_the_views_and_the_picture_is_that_without_them() {
 
 #[test]
 fn layers_without_a_place_are_refused() {
-    let desk = desk();
+    let dir = dir();
     for (options, words) in [
         ("--once -o a.png --layers all", "--layers is for EXR files, and a.png is none"),
         ("--once -o a.exr -o b.hdr --layers all", "b.hdr is none"),
@@ -115,7 +115,7 @@ fn layers_without_a_place_are_refused() {
         ("--once -o a.part --shard 1/2 --layers depth", "exclude each other"),
         ("-o a.exr --layers depth", "--layers needs --once"),
     ] {
-        let stderr = desk.expect(&format!("room.toml {options}"), 2);
+        let stderr = dir.expect(&format!("room.toml {options}"), 2);
         assert!(stderr.contains(words), "{options}: {stderr}");
     }
 }

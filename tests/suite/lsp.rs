@@ -5,7 +5,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Stdio};
 
 use serde_json::{Value, json};
 
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 
 const TEXT: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n\n[textures.bricks]\nfile = \"bricks.png\"\n\n\
                     [materials.wall]\ntype = \"metal\"\ncolor = [1, 0.5, 0]\nroughness = { texture = \"bricks\" }\n\n\
@@ -19,19 +19,19 @@ struct Editor {
     uri: String,
     next: u64,
     version: u64,
-    desk: Desk,
+    dir: TestDir,
 }
 
 impl Editor {
     fn open(text: &str) -> Self {
-        let desk = Desk::new();
-        desk.write("scene.toml", text);
-        image::RgbImage::new(2, 2).save(desk.path("bricks.png")).expect("written");
-        let mut process = desk.glimt("lsp");
+        let dir = TestDir::new();
+        dir.write("scene.toml", text);
+        image::RgbImage::new(2, 2).save(dir.path("bricks.png")).expect("written");
+        let mut process = dir.glimt("lsp");
         let mut child = process.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
         let (keys, screen) = (child.stdin.take().expect("stdin"), child.stdout.take().expect("stdout"));
-        let uri = format!("file://{}", desk.path("scene.toml").display());
-        let mut editor = Self { child, keys, screen: BufReader::new(screen), uri, next: 0, version: 1, desk };
+        let uri = format!("file://{}", dir.path("scene.toml").display());
+        let mut editor = Self { child, keys, screen: BufReader::new(screen), uri, next: 0, version: 1, dir };
         let answer =
             editor.ask("initialize", &json!({ "processId": null, "rootUri": null, "capabilities": {} }));
         assert_eq!(answer["serverInfo"]["name"], "glimt");
@@ -147,7 +147,7 @@ fn mistakes_are_shown_while_typing_and_those_of_files_after_a_save() {
     assert_eq!((&unknown["severity"], &unknown["source"]), (&json!(1), &json!("glimt")));
     assert!(unknown["message"].as_str().is_some_and(|text| text.contains("did you mean `radius`?")));
     // An image that is none: only reading it tells.
-    editor.desk.write("bricks.png", "no image");
+    editor.dir.write("bricks.png", "no image");
     editor.change(TEXT);
     let uri = editor.uri.clone();
     editor.tell("textDocument/didSave", &json!({ "textDocument": { "uri": uri } }));
@@ -253,8 +253,8 @@ fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
 
 /// Sends bytes to a new server; returns its exit code, its answers and its stderr.
 fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
-    let desk = Desk::new();
-    let mut process = desk.glimt("lsp");
+    let dir = TestDir::new();
+    let mut process = dir.glimt("lsp");
     process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = process.spawn().expect("it runs");
     let mut keys = child.stdin.take().expect("stdin");

@@ -10,7 +10,7 @@ mod checkpoints;
 mod closed_forms;
 mod compare;
 mod contract;
-mod desk;
+mod test_dir;
 mod docs;
 mod extremes;
 mod gltf;
@@ -24,7 +24,7 @@ mod layers;
 mod library;
 mod lsp;
 mod models;
-mod mutation;
+mod fuzz;
 #[cfg(target_os = "linux")]
 mod niceness;
 mod noise;

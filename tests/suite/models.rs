@@ -1,28 +1,28 @@
 //! Models in files of every format, with their own materials.
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const CAMERA: &str = "[render]\nwidth = 24\nheight = 18\nsamples = 4\n[camera]\nposition = [0.3, 0.4, 3]\nlook_at = [0.5, 0.4, 0]\n\
                       [[light]]\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n[environment]\ncolor = [0.3, 0.4, 0.5]\n";
 
 /// The linear values of a scene's picture.
-fn picture(desk: &Desk, scene: &str) -> Vec<f32> {
-    desk.write("scene.toml", format!("{CAMERA}{scene}"));
-    desk.expect("scene.toml --once -o scene.exr", 0);
-    image::open(desk.path("scene.exr")).expect("a picture").to_rgb32f().into_raw()
+fn picture(dir: &TestDir, scene: &str) -> Vec<f32> {
+    dir.write("scene.toml", format!("{CAMERA}{scene}"));
+    dir.expect("scene.toml --once -o scene.exr", 0);
+    image::open(dir.path("scene.exr")).expect("a picture").to_rgb32f().into_raw()
 }
 
 #[test]
 fn one_tetrahedron_is_one_picture_in_every_format() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     let words = |[a, b, c]: [i32; 3]| format!("{a} {b} {c}\n");
     let vertices = corners.map(words).concat();
     let numbered = faces.map(|face| format!("3 {}", words(face.map(|corner: usize| corner as i32)))).concat();
-    desk.write("a.off", format!("OFF\n4 4 0\n{vertices}{numbered}"));
+    dir.write("a.off", format!("OFF\n4 4 0\n{vertices}{numbered}"));
     let properties = ["x", "y", "z"].map(|name| format!("property float {name}\n")).concat();
-    desk.write(
+    dir.write(
         "a.ply",
         format!(
             "ply\nformat ascii 1.0\nelement vertex 4\n{properties}element face 4\nproperty list uchar int \
@@ -31,25 +31,25 @@ fn one_tetrahedron_is_one_picture_in_every_format() {
     );
     let obj = corners.map(|corner| format!("v {}", words(corner))).concat()
         + &faces.map(|face| format!("f {}", words(face.map(|corner| corner as i32 + 1)))).concat();
-    desk.write("a.obj", obj);
+    dir.write("a.obj", obj);
     let places = faces.map(|face| face.map(|corner| corners[corner]));
     let facet = |places: [[i32; 3]; 3]| {
         let vertices = places.map(|place| format!("vertex {}", words(place))).concat();
         format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
     };
-    desk.write("a.stl", format!("solid a\n{}endsolid a\n", places.map(facet).concat()));
+    dir.write("a.stl", format!("solid a\n{}endsolid a\n", places.map(facet).concat()));
     let mut bytes = [&b"solid is how many begin"[..], &[0; 57], &4_u32.to_le_bytes()].concat();
     for place in places {
         bytes.extend([0; 12]);
         bytes.extend(place.as_flattened().iter().flat_map(|number| (*number as f32).to_le_bytes()));
         bytes.extend([0; 2]);
     }
-    desk.write("b.STL", bytes);
+    dir.write("b.STL", bytes);
     for smooth in [false, true] {
         let of = |file: &str| {
             let mesh =
                 format!("[[mesh]]\nfile = \"{file}\"\nmaterial = \"m\"\nsmooth = {smooth}\n[materials.m]\n");
-            picture(&desk, &mesh)
+            picture(&dir, &mesh)
         };
         let expected = of("a.off");
         assert!(expected.iter().any(|value| (value - expected[0]).abs() > 0.1), "it is seen");
@@ -61,10 +61,10 @@ fn one_tetrahedron_is_one_picture_in_every_format() {
 
 #[test]
 fn the_physical_extension_of_mtl_is_the_principled_material() {
-    let desk = Desk::new();
-    desk.write("dull.ppm", "P3 2 2 255 20 20 20 90 90 90 160 160 160 230 230 230\n");
-    desk.write("skin.ppm", "P3 2 1 255 250 120 60 40 90 230\n");
-    desk.write(
+    let dir = TestDir::new();
+    dir.write("dull.ppm", "P3 2 2 255 20 20 20 90 90 90 160 160 160 230 230 230\n");
+    dir.write("skin.ppm", "P3 2 1 255 250 120 60 40 90 230\n");
+    dir.write(
         "a.obj",
         "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n",
     );
@@ -97,30 +97,30 @@ fn the_physical_extension_of_mtl_is_the_principled_material() {
             "color = { texture = \"skin\" }\nroughness = { texture = \"dull\" }\nmetallic = { texture = \"dull\" }\n",
         ),
     ] {
-        desk.write("a.mtl", format!("newmtl m\n{mtl}"));
+        dir.write("a.mtl", format!("newmtl m\n{mtl}"));
         let textures = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.dull]\nfile = \"dull.ppm\"\n";
         let declared = format!("[materials.m]\ntype = \"principled\"\n{keys}{textures}");
-        let own = picture(&desk, "[[mesh]]\nfile = \"a.obj\"\n");
-        let expected = picture(&desk, &format!("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\n{declared}"));
+        let own = picture(&dir, "[[mesh]]\nfile = \"a.obj\"\n");
+        let expected = picture(&dir, &format!("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\n{declared}"));
         assert!(own == expected, "{mtl}");
-        desk.write("a.mtl", "newmtl m\nKd 0.8 0.4 0.2\n");
-        assert!(picture(&desk, "[[mesh]]\nfile = \"a.obj\"\n") != expected, "{mtl}: it matters");
+        dir.write("a.mtl", "newmtl m\nKd 0.8 0.4 0.2\n");
+        assert!(picture(&dir, "[[mesh]]\nfile = \"a.obj\"\n") != expected, "{mtl}: it matters");
     }
 }
 
 /// MeshLab and others count `Tr` the other way round: 1 is opaque there, as is 0 for the rest.
 #[test]
 fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() {
-    let desk = Desk::new();
-    desk.write("shine.ppm", "P3 1 1 255 255 255 255\n");
-    desk.write(
+    let dir = TestDir::new();
+    dir.write("shine.ppm", "P3 1 1 255 255 255 255\n");
+    dir.write(
         "a.obj",
         "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\nusemtl n\nf 1/1 3/1 2/1\n",
     );
     let said = |mtl: &str| {
-        desk.write("a.mtl", format!("newmtl m\n{mtl}newmtl n\n{mtl}newmtl unused\n{mtl}"));
-        let said = desk.expect("a.obj --once --force --width 24 --height 18 --samples 4 -o a.exr", 0);
-        (desk.bytes("a.exr"), said)
+        dir.write("a.mtl", format!("newmtl m\n{mtl}newmtl n\n{mtl}newmtl unused\n{mtl}"));
+        let said = dir.expect("a.obj --once --force --width 24 --height 18 --samples 4 -o a.exr", 0);
+        (dir.bytes("a.exr"), said)
     };
     let (plain, quiet) = said("Kd 0.8 0.8 0.8\n");
     assert!(!quiet.contains("warning"), "{quiet}");
@@ -151,64 +151,64 @@ fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() 
 
 #[test]
 fn a_direction_that_a_mesh_has_not_is_a_warning() {
-    let desk = Desk::new();
-    desk.write("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+    let dir = TestDir::new();
+    dir.write("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
     let scene = |anisotropy: &str| {
         format!(
             "{CAMERA}[[mesh]]\nfile = \"a.stl\"\nmaterial = \"m\"\n[materials.m]\ntype = \"metal\"\ncolor = 0.9\nanisotropy = {anisotropy}\n"
         )
     };
-    desk.write("brushed.toml", scene("0.5"));
-    let stderr = desk.expect("brushed.toml --once -o a.exr", 0);
+    dir.write("brushed.toml", scene("0.5"));
+    let stderr = dir.expect("brushed.toml --once -o a.exr", 0);
     let message = "a.stl has no texture coordinates: the `anisotropy` of \"m\" has no direction there";
     assert!(
         stderr.contains("warning") && stderr.contains(message) && stderr.contains("brushed.toml:"),
         "{stderr}"
     );
-    desk.write("plain.toml", scene("0.0"));
-    assert!(!desk.expect("plain.toml --once -o b.exr", 0).contains("anisotropy"));
+    dir.write("plain.toml", scene("0.0"));
+    assert!(!dir.expect("plain.toml --once -o b.exr", 0).contains("anisotropy"));
 }
 
 #[test]
 fn pictures_of_a_material_file_are_named_with_their_material() {
-    let desk = Desk::new();
-    desk.write(
+    let dir = TestDir::new();
+    dir.write(
         "a.obj",
         "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl brick\nf 1/1 2/2 3/3\n",
     );
-    desk.write("a.toml", format!("{CAMERA}[[mesh]]\nfile = \"a.obj\"\n"));
-    desk.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
-    desk.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
-    let missing = desk.expect("a.toml --once -o a.png", 2);
+    dir.write("a.toml", format!("{CAMERA}[[mesh]]\nfile = \"a.obj\"\n"));
+    dir.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
+    dir.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
+    let missing = dir.expect("a.toml --once -o a.png", 2);
     assert!(
         missing.contains("lost.png") && missing.contains("the material \"brick\" of a.obj names it"),
         "{missing}"
     );
-    desk.write("lost.png", "no picture");
-    let wrong = desk.expect("a.toml --once -o a.png", 2);
+    dir.write("lost.png", "no picture");
+    let wrong = dir.expect("a.toml --once -o a.png", 2);
     assert!(
         wrong.contains("lost.png") && wrong.contains("the material \"brick\" of a.obj names it"),
         "{wrong}"
     );
-    desk.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
-    let grey = desk.expect("a.toml --once -o a.png", 0);
+    dir.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
+    let grey = dir.expect("a.toml --once -o a.png", 0);
     assert!(grey.contains("heights.pgm is grey: heights in place of the normals of \"brick\""), "{grey}");
     assert!(grey.contains("it bends nothing"), "{grey}");
 }
 
 #[test]
 fn images_that_cannot_be_what_a_material_takes_them_for_are_named() {
-    let desk = Desk::new();
-    desk.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
+    let dir = TestDir::new();
+    dir.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
     let said = |material: &str| {
-        desk.write(
+        dir.write(
             "a.toml",
             format!(
                 "{CAMERA}[textures.t]\nfile = \"heights.pgm\"\n[materials.m]\n{material}\n\
                  [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n"
             ),
         );
-        desk.expect("a.toml --once -o a.png", 0)
+        dir.expect("a.toml --once -o a.png", 0)
     };
     let grey = said("normal_map = \"t\"");
     assert!(
@@ -225,19 +225,19 @@ fn images_that_cannot_be_what_a_material_takes_them_for_are_named() {
 
 #[test]
 fn keys_that_change_nothing_on_a_mesh_are_warned_of() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n";
-    desk.write("a.off", format!("COFF\n3 1 0\n{corners}3 0 1 2\n"));
-    desk.write("dots.ppm", "P3\n2 1\n255\n0 0 0 255 255 255\n");
+    dir.write("a.off", format!("COFF\n3 1 0\n{corners}3 0 1 2\n"));
+    dir.write("dots.ppm", "P3\n2 1\n255\n0 0 0 255 255 255\n");
     let warnings = |material: &str, more: &str| {
-        desk.write(
+        dir.write(
             "a.toml",
             format!(
                 "{CAMERA}[[mesh]]\nfile = \"a.off\"\nmaterial = \"m\"\n{more}\n[materials.m]\n{material}\n\
                  [textures.dots]\nfile = \"dots.ppm\"\n"
             ),
         );
-        desk.expect("a.toml --once -o a.png", 0)
+        dir.expect("a.toml --once -o a.png", 0)
     };
     let textured = warnings("diffuse = { texture = \"dots\" }", "");
     let message = "a.off has no texture coordinates: each triangle shows half of the textures of \"m\"";

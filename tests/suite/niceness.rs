@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 
 /// Longest time to wait for anything, on however busy a machine.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -66,9 +66,9 @@ fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
 
 #[test]
 fn once_and_bench_give_way_to_nobody_unless_they_are_asked_to() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     // As many samples as it never gets to.
-    desk.write("long.toml", SCENE.replace("samples = 2", "samples = 4000000000"));
+    dir.write("long.toml", SCENE.replace("samples = 2", "samples = 4000000000"));
     let calls = [
         ("long.toml --once --threads 2 --progress json", "\"event\":\"progress\""),
         (
@@ -77,7 +77,7 @@ fn once_and_bench_give_way_to_nobody_unless_they_are_asked_to() {
         ),
     ];
     for (call, sign) in calls {
-        assert_eq!(of_program(desk.glimt(call), sign), [raised(0)], "{call}");
-        assert_eq!(of_program(desk.glimt(&format!("{call} --nice 7")), sign), [raised(7)], "{call} --nice 7");
+        assert_eq!(of_program(dir.glimt(call), sign), [raised(0)], "{call}");
+        assert_eq!(of_program(dir.glimt(&format!("{call} --nice 7")), sign), [raised(7)], "{call} --nice 7");
     }
 }

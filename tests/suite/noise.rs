@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
@@ -74,20 +74,20 @@ material = "ball"
     )
 }
 
-fn desk(scene: &str) -> Desk {
-    let desk = Desk::new();
-    desk.write("scene.toml", scene);
-    desk.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
-    desk
+fn dir(scene: &str) -> TestDir {
+    let dir = TestDir::new();
+    dir.write("scene.toml", scene);
+    dir.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
+    dir
 }
 
 /// The luminances of a picture and the error in its report.
-fn render(desk: &Desk, options: &str) -> (Vec<f64>, f64) {
-    let output = desk.run(&format!("scene.toml --once --progress none -o a.exr --report a.json {options}"));
+fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
+    let output = dir.run(&format!("scene.toml --once --progress none -o a.exr --report a.json {options}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value =
-        serde_json::from_slice(&fs::read(desk.path("a.json")).expect("a report")).expect("JSON");
-    let picture = image::open(desk.path("a.exr")).expect("a picture").to_rgb32f();
+        serde_json::from_slice(&fs::read(dir.path("a.json")).expect("a report")).expect("JSON");
+    let picture = image::open(dir.path("a.exr")).expect("a picture").to_rgb32f();
     let luminance =
         |pixel: &[f32]| pixel.iter().zip(LUMINANCE).map(|(value, weight)| f64::from(*value) * weight).sum();
     (
@@ -104,9 +104,9 @@ struct Seeds {
 }
 
 impl Seeds {
-    fn of(desk: &Desk, count: u32, options: &str) -> Self {
+    fn of(dir: &TestDir, count: u32, options: &str) -> Self {
         let runs: Vec<_> =
-            (1..=count).map(|seed| render(desk, &format!("--seed {seed} {options}"))).collect();
+            (1..=count).map(|seed| render(dir, &format!("--seed {seed} {options}"))).collect();
         let count = f64::from(count);
         let pixels = 0..runs[0].0.len();
         let means: Vec<f64> = pixels
@@ -148,9 +148,9 @@ impl Seeds {
 #[test]
 fn the_error_of_the_report_is_the_true_one() {
     for (name, scene) in [("penumbra", PENUMBRA), ("caustic", CAUSTIC)] {
-        let desk = desk(&format!("{HEAD}{scene}"));
+        let dir = dir(&format!("{HEAD}{scene}"));
         for samples in [16, 64] {
-            let seeds = Seeds::of(&desk, 24, &format!("--integrator path --samples {samples}"));
+            let seeds = Seeds::of(&dir, 24, &format!("--integrator path --samples {samples}"));
             let ratio = seeds.reported / seeds.error();
             assert!((0.9..1.35).contains(&ratio), "{name}, {samples} samples: {ratio}");
         }
@@ -160,8 +160,8 @@ fn the_error_of_the_report_is_the_true_one() {
 #[test]
 fn tiles_that_stop_by_their_noise_have_no_more_than_was_asked() {
     for (name, scene, error) in [("penumbra", PENUMBRA, 0.05), ("caustic", CAUSTIC, 0.4)] {
-        let desk = desk(&format!("{HEAD}{scene}"));
-        let seeds = Seeds::of(&desk, 24, &format!("--integrator path --samples 4096 --error {error}"));
+        let dir = dir(&format!("{HEAD}{scene}"));
+        let seeds = Seeds::of(&dir, 24, &format!("--integrator path --samples 4096 --error {error}"));
         let tiles = seeds.tiles();
         let parts =
             (tiles.iter().map(|tile| (tile / error).powi(2)).sum::<f64>() / tiles.len() as f64).sqrt();
@@ -176,9 +176,9 @@ fn glossy_surfaces_under_a_sky_are_about_as_quiet_by_whitted_as_by_paths() {
     let skies = ["[environment]\ncolor = [1, 1, 1]", "[environment]\nfile = \"sky.ppm\"", WIDE_SUN];
     for sky in skies {
         for shininess in [5, 60, 99, 300] {
-            let desk = desk(&ball(sky, shininess));
+            let dir = dir(&ball(sky, shininess));
             let [whitted, path] = ["whitted", "path"]
-                .map(|integrator| Seeds::of(&desk, 8, &format!("--samples 16 --integrator {integrator}")));
+                .map(|integrator| Seeds::of(&dir, 8, &format!("--samples 16 --integrator {integrator}")));
             let ratio = whitted.variance() / path.variance();
             assert!(ratio <= 2.0, "{sky}, shininess {shininess}: {ratio} times the variance");
             let error = ((whitted.variance() + path.variance()) / 8.0 / whitted.means.len() as f64).sqrt();
@@ -190,18 +190,18 @@ fn glossy_surfaces_under_a_sky_are_about_as_quiet_by_whitted_as_by_paths() {
 
 #[test]
 fn a_filter_with_negative_lobes_leaves_dark_noise_as_bright_as_it_is() {
-    let desk = desk(&format!("{HEAD}{CAUSTIC}"));
+    let dir = dir(&format!("{HEAD}{CAUSTIC}"));
     let of = |filter: &str| {
         let scene =
             format!("{HEAD}{CAUSTIC}").replace("height = 32", &format!("height = 32\nfilter = \"{filter}\""));
-        desk.write("scene.toml", scene);
-        Seeds::of(&desk, 16, "--integrator path --samples 8")
+        dir.write("scene.toml", scene);
+        Seeds::of(&dir, 16, "--integrator path --samples 8")
     };
     let [mitchell, plain] = ["mitchell", "box"].map(of);
     let pixels = (16 * plain.means.len()) as f64;
     let error = ((mitchell.variance() + plain.variance()) / pixels).sqrt();
     let difference = mitchell.mean() - plain.mean();
     assert!(difference.abs() < 3.0 * error, "{difference} ± {error} of {}", plain.mean());
-    let (picture, _) = render(&desk, "--integrator path --samples 8 --set render.filter=mitchell");
+    let (picture, _) = render(&dir, "--integrator path --samples 8 --set render.filter=mitchell");
     assert!(picture.iter().any(|luminance| *luminance < 0.0), "the file keeps what is negative");
 }

@@ -4,15 +4,15 @@ use std::fs;
 use std::process::{Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 
 #[test]
 fn a_scene_is_rendered_and_named_at_the_end() {
-    let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once", 0);
+    let dir = TestDir::new();
+    let stderr = dir.expect("ball.toml --once", 0);
     let last = stderr.lines().last().expect("a line");
     assert!(last.starts_with("wrote ball.png (32×24, 2 samples, "), "{last}");
-    assert!(desk.path("ball.png").is_file());
+    assert!(dir.path("ball.png").is_file());
     for stage in ["parse", "accel", "render", "write"] {
         assert!(stderr.lines().any(|line| line.starts_with(stage)), "{stage}: {stderr}");
     }
@@ -20,33 +20,33 @@ fn a_scene_is_rendered_and_named_at_the_end() {
 
 #[test]
 fn an_output_of_the_scene_lies_beside_it_and_one_of_the_call_in_the_working_directory() {
-    let desk = Desk::new();
-    fs::create_dir_all(desk.path("scenes/out")).expect("a folder");
-    desk.write("scenes/own.toml", SCENE.replace("[render]", "[render]\noutput = \"out/own.ppm\""));
-    desk.write("scenes/none.toml", SCENE);
-    let stderr = desk.expect("scenes/own.toml --once", 0);
+    let dir = TestDir::new();
+    fs::create_dir_all(dir.path("scenes/out")).expect("a folder");
+    dir.write("scenes/own.toml", SCENE.replace("[render]", "[render]\noutput = \"out/own.ppm\""));
+    dir.write("scenes/none.toml", SCENE);
+    let stderr = dir.expect("scenes/own.toml --once", 0);
     assert!(stderr.contains("wrote scenes/out/own.ppm (32×24"), "{stderr}");
-    assert!(desk.path("scenes/out/own.ppm").is_file());
-    desk.expect("scenes/none.toml --once", 0);
-    assert!(desk.path("none.png").is_file());
-    desk.expect("scenes/own.toml --once -o call.png", 0);
-    assert!(desk.path("call.png").is_file());
-    assert_eq!(fs::read_dir(desk.path("scenes")).expect("a folder").count(), 3, "nothing else is beside it");
+    assert!(dir.path("scenes/out/own.ppm").is_file());
+    dir.expect("scenes/none.toml --once", 0);
+    assert!(dir.path("none.png").is_file());
+    dir.expect("scenes/own.toml --once -o call.png", 0);
+    assert!(dir.path("call.png").is_file());
+    assert_eq!(fs::read_dir(dir.path("scenes")).expect("a folder").count(), 3, "nothing else is beside it");
 }
 
 #[test]
 fn several_outputs_and_no_progress() {
-    let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
+    let dir = TestDir::new();
+    let stderr = dir.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
     assert_eq!(stderr, "");
-    assert!(desk.path("a.png").is_file() && desk.path("b.ppm").is_file());
-    assert!(!desk.path("ball.png").exists());
+    assert!(dir.path("a.png").is_file() && dir.path("b.ppm").is_file());
+    assert!(!dir.path("ball.png").exists());
 }
 
 #[test]
 fn json_lines_have_the_keys_that_are_documented() {
-    let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once --progress json", 0);
+    let dir = TestDir::new();
+    let stderr = dir.expect("ball.toml --once --progress json", 0);
     let lines: Vec<serde_json::Value> =
         stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let of = |event: &str| lines.iter().filter(|line| line["event"] == event).collect::<Vec<_>>();
@@ -64,9 +64,9 @@ fn json_lines_have_the_keys_that_are_documented() {
 
 #[test]
 fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
-    let desk = Desk::new();
-    desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
-    let stderr = desk.expect("ball.toml --once --progress json", 2);
+    let dir = TestDir::new();
+    dir.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
+    let stderr = dir.expect("ball.toml --once --progress json", 2);
     let lines: Vec<serde_json::Value> =
         stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let last = lines.last().expect("a line");
@@ -79,9 +79,9 @@ fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
 
 #[test]
 fn the_report_has_its_keys() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once --report r.json --seed 5 --threads 2 --samples 3", 0);
-    let text = fs::read_to_string(desk.path("r.json")).expect("a report");
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once --report r.json --seed 5 --threads 2 --samples 3", 0);
+    let text = fs::read_to_string(dir.path("r.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(report["glimt"], env!("CARGO_PKG_VERSION"));
     assert_eq!(report["scene"], "ball.toml");
@@ -152,12 +152,12 @@ fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &s
 
 #[test]
 fn the_report_has_every_key_with_its_type() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let example: serde_json::Value = serde_json::from_str(REPORT).expect("JSON");
-    let report = desk.report("ball.toml --samples 3");
+    let report = dir.report("ball.toml --samples 3");
     assert_like(&example, &report, "report");
     let error =
-        |samples: u32| desk.report(&format!("ball.toml --samples {samples}"))["image"]["error"].clone();
+        |samples: u32| dir.report(&format!("ball.toml --samples {samples}"))["image"]["error"].clone();
     assert!(error(1).is_null(), "one sample tells nothing of its error");
     let [few, many] = [4, 256].map(|samples| error(samples).as_f64().expect("an estimate"));
     assert!(many > 0.0 && many < 0.25 * few && few < 1.0, "{few} {many}");
@@ -165,67 +165,67 @@ fn the_report_has_every_key_with_its_type() {
 
 #[test]
 fn a_wrong_scene_is_2_and_leaves_the_picture() {
-    let desk = Desk::new();
-    desk.write("ball.png", "the old one");
-    desk.write("ball.toml", SCENE.replace("width = 32", "width = = 32"));
-    let stderr = desk.expect("ball.toml --once", 2);
+    let dir = TestDir::new();
+    dir.write("ball.png", "the old one");
+    dir.write("ball.toml", SCENE.replace("width = 32", "width = = 32"));
+    let stderr = dir.expect("ball.toml --once", 2);
     assert!(stderr.contains("error") && stderr.contains("ball.toml:2:"), "{stderr}");
-    assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
-    let stderr = desk.expect("missing.toml --once", 2);
+    assert_eq!(fs::read(dir.path("ball.png")).expect("there"), b"the old one");
+    let stderr = dir.expect("missing.toml --once", 2);
     assert!(stderr.contains("missing.toml"), "{stderr}");
 }
 
 #[test]
 fn a_mesh_that_is_not_there_is_2_and_named() {
-    let desk = Desk::new();
-    desk.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"no.obj\"\nmaterial = \"ball\"\n"));
-    let stderr = desk.expect("ball.toml --once", 2);
+    let dir = TestDir::new();
+    dir.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"no.obj\"\nmaterial = \"ball\"\n"));
+    let stderr = dir.expect("ball.toml --once", 2);
     assert!(stderr.contains("no.obj") && stderr.contains("ball.toml:25:"), "{stderr}");
-    assert!(!desk.path("ball.png").exists());
+    assert!(!dir.path("ball.png").exists());
 }
 
 #[test]
 fn what_is_wrong_with_the_call_is_not_said_of_the_scene() {
-    let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
+    let dir = TestDir::new();
+    let stderr = dir.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
     assert!(stderr.starts_with("error: --crop 0,0,33,1") && !stderr.contains("-->"), "{stderr}");
-    let stderr = desk.expect("ball.toml --once --bit-depth 16 -o a.png -o a.jpg --progress none", 2);
+    let stderr = dir.expect("ball.toml --once --bit-depth 16 -o a.png -o a.jpg --progress none", 2);
     assert!(stderr.contains("JPEG") && stderr.contains("--> a.jpg\n"), "{stderr}");
-    desk.write("ball.toml", SCENE.replace("[render]", "[render]\noutput = \"own.jpg\""));
-    let stderr = desk.expect("ball.toml --once --bit-depth 16 --progress none", 2);
+    dir.write("ball.toml", SCENE.replace("[render]", "[render]\noutput = \"own.jpg\""));
+    let stderr = dir.expect("ball.toml --once --bit-depth 16 --progress none", 2);
     assert!(stderr.contains("--> own.jpg\n"), "{stderr}");
-    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+    assert_eq!(fs::read_dir(dir.0.path()).expect("a folder").count(), 1, "nothing was written");
 }
 
 #[test]
 fn options_that_change_nothing_are_told() {
-    let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once --dof on --photons on --integrator path --progress none", 0);
+    let dir = TestDir::new();
+    let stderr = dir.expect("ball.toml --once --dof on --photons on --integrator path --progress none", 0);
     let warning = "warning: --dof on has no effect: the scene's camera is a pinhole";
     assert!(stderr.contains(warning) && stderr.contains("--photons on has no effect"), "{stderr}");
     assert!(stderr.ends_with("2 warnings\n"), "{stderr}");
-    let stderr = desk.expect("ball.toml --once --dof on --progress json", 0);
+    let stderr = dir.expect("ball.toml --once --dof on --progress json", 0);
     let done = stderr.lines().last().map(serde_json::from_str::<serde_json::Value>);
     let done = done.expect("a line").expect("JSON");
     let warning = &done["diagnostics"][0];
     assert!(warning["path"].is_null() && warning["line"].is_null(), "{done}");
-    desk.write("ball.toml", SCENE.replace("[materials", "aperture = 0.1\n[materials"));
-    let stderr = desk.expect("ball.toml --once --dof on --photons off --progress none", 0);
+    dir.write("ball.toml", SCENE.replace("[materials", "aperture = 0.1\n[materials"));
+    let stderr = dir.expect("ball.toml --once --dof on --photons off --progress none", 0);
     assert_eq!(stderr, "");
 }
 
 #[test]
 fn a_generated_mesh_that_is_not_there_is_told_with_its_maker() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/million.toml");
-    desk.write("million.toml", fs::read_to_string(scene).expect("a scene"));
-    let stderr = desk.expect("check million.toml", 2);
+    dir.write("million.toml", fs::read_to_string(scene).expect("a scene"));
+    let stderr = dir.expect("check million.toml", 2);
     assert!(stderr.contains("there is no file") && stderr.contains("glimt-assets -- million"), "{stderr}");
 }
 
 #[test]
 fn a_wrong_call_is_2() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (line, word) in [
         ("ball.toml --once --samples 0", "--samples"),
         ("ball.toml --once --integrator paths", "path"),
@@ -237,40 +237,40 @@ fn a_wrong_call_is_2() {
         ("ball.toml --nonsense", "--nonsense"),
         ("--once", "SCENE"),
     ] {
-        let stderr = desk.expect(line, 2);
+        let stderr = dir.expect(line, 2);
         assert!(stderr.contains(word), "{line}: {stderr}");
     }
-    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+    assert_eq!(fs::read_dir(dir.0.path()).expect("a folder").count(), 1, "nothing was written");
 }
 
 #[test]
 fn a_file_that_cannot_be_written_is_1() {
-    let desk = Desk::new();
-    let stderr = desk.expect("ball.toml --once -o nowhere/a.png", 1);
+    let dir = TestDir::new();
+    let stderr = dir.expect("ball.toml --once -o nowhere/a.png", 1);
     assert!(stderr.contains("nowhere"), "{stderr}");
-    let stderr = desk.expect("ball.toml --once --report nowhere/r.json", 1);
+    let stderr = dir.expect("ball.toml --once --report nowhere/r.json", 1);
     assert!(stderr.contains("nowhere/r.json"), "{stderr}");
 }
 
 #[test]
 fn each_output_that_cannot_be_written_has_a_line() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for name in ["a.png", "b.ppm"] {
-        std::os::unix::fs::symlink("/dev/full", desk.path(name)).expect("a link");
+        std::os::unix::fs::symlink("/dev/full", dir.path(name)).expect("a link");
     }
-    let stderr = desk.expect("ball.toml --once --progress none -o a.png -o c.png -o b.ppm", 1);
+    let stderr = dir.expect("ball.toml --once --progress none -o a.png -o c.png -o b.ppm", 1);
     let lines: Vec<&str> = stderr.lines().collect();
     assert_eq!(lines.len(), 2, "{stderr}");
     assert!(lines[0].starts_with("error: cannot write a.png: no space left"), "{stderr}");
     assert!(lines[1].starts_with("error: cannot write b.ppm: no space left"), "{stderr}");
-    assert!(desk.path("c.png").is_file());
+    assert!(dir.path("c.png").is_file());
 }
 
 #[test]
 fn a_command_that_is_said_can_be_pasted() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let name = "it's my \"scene\" $HOME.toml";
-    let output = desk.glimt("new").arg(name).output().expect("it runs");
+    let output = dir.glimt("new").arg(name).output().expect("it runs");
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
     let command = stderr.lines().find_map(|line| line.strip_prefix("now: glimt ")).expect("a command");
     let command = command.split("    (").next().expect("its end");
@@ -280,11 +280,11 @@ fn a_command_that_is_said_can_be_pasted() {
 
 #[test]
 fn help_and_version_are_answers() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (line, word) in
         [("--help", "--samples"), ("--version", glimt::pipeline::BUILD), ("new --help", "FILE")]
     {
-        let output = desk.run(line);
+        let output = dir.run(line);
         assert_eq!(output.status.code(), Some(0));
         assert!(String::from_utf8_lossy(&output.stdout).contains(word), "{line}");
     }
@@ -292,26 +292,26 @@ fn help_and_version_are_answers() {
 
 #[test]
 fn check_says_what_there_is() {
-    let desk = Desk::new();
-    let output = desk.run("check ball.toml");
+    let dir = TestDir::new();
+    let output = dir.run("check ball.toml");
     assert_eq!(output.status.code(), Some(0));
     let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(stdout.starts_with("ok: ball.toml: 1 object, 0 triangles"), "{stdout}");
-    desk.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
-    let stderr = desk.expect("check ball.toml", 2);
+    dir.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
+    let stderr = dir.expect("check ball.toml", 2);
     assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
 }
 
 #[test]
 fn check_warns_of_meshes_in_the_dark() {
-    let desk = Desk::new();
-    desk.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
-    desk.write("a.mtl", "newmtl a\nKd 1 1 1\n");
+    let dir = TestDir::new();
+    dir.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+    dir.write("a.mtl", "newmtl a\nKd 1 1 1\n");
     let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[mesh]]\nfile = \"a.obj\"\n";
-    desk.write("dark.toml", scene);
-    let said = |name: &str| String::from_utf8_lossy(&desk.run(&format!("check {name}")).stderr).into_owned();
+    dir.write("dark.toml", scene);
+    let said = |name: &str| String::from_utf8_lossy(&dir.run(&format!("check {name}")).stderr).into_owned();
     assert!(said("dark.toml").contains("nothing lights this scene"), "{}", said("dark.toml"));
-    desk.write("lit.toml", format!("{scene}[[light]]\n"));
+    dir.write("lit.toml", format!("{scene}[[light]]\n"));
     assert!(!said("lit.toml").contains("nothing lights"), "{}", said("lit.toml"));
 }
 
@@ -319,33 +319,33 @@ fn check_warns_of_meshes_in_the_dark() {
 fn a_scene_of_very_many_shapes_is_checked() {
     use std::fmt::Write;
     const COUNT: u32 = 200_000;
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let mut text = SCENE.to_owned();
     for i in 1..COUNT {
         let (x, y, z) = (i % 97, i / 97 % 89, i / 8633);
         let sphere = format!("center = [{x}.25, {y}.5, -{z}]\nradius = 0.125\nmaterial = \"ball\"");
         writeln!(text, "[[sphere]]\n{sphere}").expect("memory");
     }
-    desk.write("many.toml", text);
-    let output = desk.run("check many.toml");
+    dir.write("many.toml", text);
+    let output = dir.run("check many.toml");
     let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(stdout.starts_with("ok: many.toml: 200000 objects, 0 triangles"), "{stdout}");
 }
 
 #[test]
 fn new_writes_a_scene_that_renders_and_never_overwrites() {
-    let desk = Desk::new();
-    let stderr = desk.expect("new fresh.toml", 0);
+    let dir = TestDir::new();
+    let stderr = dir.expect("new fresh.toml", 0);
     assert!(stderr.contains("glimt fresh.toml"), "{stderr}");
-    desk.expect("fresh.toml --once --width 16 --height 12 --samples 1", 0);
-    let stderr = desk.expect("new ball.toml", 2);
+    dir.expect("fresh.toml --once --width 16 --height 12 --samples 1", 0);
+    let stderr = dir.expect("new ball.toml", 2);
     assert!(stderr.contains("ball.toml exists"), "{stderr}");
-    assert_eq!(fs::read_to_string(desk.path("ball.toml")).expect("there"), SCENE);
-    desk.expect("new nowhere/x.toml", 1);
+    assert_eq!(fs::read_to_string(dir.path("ball.toml")).expect("there"), SCENE);
+    dir.expect("new nowhere/x.toml", 1);
     // A folder of that name is there already, however it is written.
-    fs::create_dir(desk.path("sub")).expect("a folder");
+    fs::create_dir(dir.path("sub")).expect("a folder");
     for name in ["sub", "sub/"] {
-        let stderr = desk.expect(&format!("new {name}"), 2);
+        let stderr = dir.expect(&format!("new {name}"), 2);
         assert_eq!(stderr, format!("error: {name} exists already, and is left as it is\n"));
     }
 }
@@ -354,14 +354,14 @@ fn new_writes_a_scene_that_renders_and_never_overwrites() {
 fn a_name_that_no_command_line_shows_is_in_no_advice() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for name in ["new\nline.toml".as_bytes(), b"\xff.toml", "a\u{202e}b.toml".as_bytes()] {
-        let output = desk.glimt("new").arg(OsStr::from_bytes(name)).output().expect("it runs");
+        let output = dir.glimt("new").arg(OsStr::from_bytes(name)).output().expect("it runs");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(0), "{said}");
         assert!(said.starts_with("wrote ") && !said.contains("glimt "), "{said}");
         let picture = [&name[..name.len() - 4], b"png"].concat();
-        let output = desk.glimt("new").arg(OsStr::from_bytes(&picture)).output().expect("it runs");
+        let output = dir.glimt("new").arg(OsStr::from_bytes(&picture)).output().expect("it runs");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(2), "{said}");
         assert!(said.contains("is the name of a picture; scenes end in .toml\n"), "{said}");
@@ -369,10 +369,10 @@ fn a_name_that_no_command_line_shows_is_in_no_advice() {
 }
 
 /// Starts a render, and sends it so many signals once it writes its picture. Returns its exit code and what it said.
-fn ended_in_the_write(desk: &Desk, line: &str, signals: usize) -> (Option<i32>, String) {
-    let stderr = fs::File::create(desk.path("stderr")).expect("a file");
-    let mut child = desk.glimt(line).stderr(stderr).spawn().expect("it runs");
-    let said = || fs::read_to_string(desk.path("stderr")).expect("there");
+fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>, String) {
+    let stderr = fs::File::create(dir.path("stderr")).expect("a file");
+    let mut child = dir.glimt(line).stderr(stderr).spawn().expect("it runs");
+    let said = || fs::read_to_string(dir.path("stderr")).expect("there");
     let start = Instant::now();
     let is_writing = || said().lines().any(|line| line.contains("\"write\"") && line.contains("running"));
     while !is_writing() {
@@ -392,32 +392,32 @@ fn ended_in_the_write(desk: &Desk, line: &str, signals: usize) -> (Option<i32>, 
 fn a_finished_render_is_not_lost_to_a_signal_while_its_picture_is_written() {
     // One signal leaves time to a picture that is written soon, a second one ends the write. Either way the samples are there.
     for (size, signals) in [("--width 700 --height 500", 1), ("--width 1600 --height 1200", 2)] {
-        let desk = Desk::new();
+        let dir = TestDir::new();
         let render = format!("ball.toml --once -o out.png --samples 1 --progress json {size}");
-        let (code, said) = ended_in_the_write(&desk, &render, signals);
-        let (picture, checkpoint) = (desk.path("out.png"), desk.path("out.png.checkpoint"));
+        let (code, said) = ended_in_the_write(&dir, &render, signals);
+        let (picture, checkpoint) = (dir.path("out.png"), dir.path("out.png.checkpoint"));
         assert!(code == Some(143) || code == Some(0) && picture.exists(), "{code:?}: {said}");
         assert!(picture.exists() != checkpoint.exists(), "{said}");
         let leftover = |entry: std::io::Result<fs::DirEntry>| {
             entry.expect("an entry").file_name().to_string_lossy().ends_with(".tmp")
         };
-        assert!(!fs::read_dir(desk.0.path()).expect("a folder").any(leftover), "no temporary file");
+        assert!(!fs::read_dir(dir.0.path()).expect("a folder").any(leftover), "no temporary file");
         if checkpoint.exists() {
-            desk.expect(&render.replace("json", "none --resume"), 0);
+            dir.expect(&render.replace("json", "none --resume"), 0);
         }
-        desk.expect(&render.replace("json", "none").replace("out.png", "one.png"), 0);
-        assert!(desk.bytes("out.png") == desk.bytes("one.png"), "{size}, {signals} signals");
+        dir.expect(&render.replace("json", "none").replace("out.png", "one.png"), 0);
+        assert!(dir.bytes("out.png") == dir.bytes("one.png"), "{size}, {signals} signals");
     }
 }
 
 #[test]
 fn a_signal_in_the_write_says_that_the_picture_is_written() {
-    let desk = Desk::new();
-    let stderr = fs::File::create(desk.path("stderr")).expect("a file");
+    let dir = TestDir::new();
+    let stderr = fs::File::create(dir.path("stderr")).expect("a file");
     let line =
         "ball.toml --once -o out.png --samples 1 --progress plain --width 700 --height 500 --checkpoint 0";
-    let mut child = desk.glimt(line).stderr(stderr).spawn().expect("it runs");
-    let said = || fs::read_to_string(desk.path("stderr")).expect("there");
+    let mut child = dir.glimt(line).stderr(stderr).spawn().expect("it runs");
+    let said = || fs::read_to_string(dir.path("stderr")).expect("there");
     let start = Instant::now();
     while !said().contains("render   done") {
         assert!(start.elapsed() < Duration::from_secs(60), "{}", said());
@@ -426,28 +426,28 @@ fn a_signal_in_the_write_says_that_the_picture_is_written() {
     let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
     let code = child.wait().expect("it ends").code();
     // Without checkpoints nothing else keeps the samples.
-    assert!(desk.path("out.png").exists(), "{code:?}: {}", said());
+    assert!(dir.path("out.png").exists(), "{code:?}: {}", said());
     assert!(said().contains("wrote out.png"), "{}", said());
     assert!(code == Some(0) || said().ends_with("ended by SIGTERM: the picture was written\n"), "{}", said());
 }
 
 #[test]
 fn the_picture_does_not_depend_on_threads() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for threads in [1, 2, 7] {
-        desk.expect(&format!("ball.toml --once -o {threads}.ppm --samples 5 --threads {threads}"), 0);
+        dir.expect(&format!("ball.toml --once -o {threads}.ppm --samples 5 --threads {threads}"), 0);
     }
-    let picture = |name: &str| fs::read(desk.path(name)).expect("a picture");
+    let picture = |name: &str| fs::read(dir.path(name)).expect("a picture");
     assert!(picture("1.ppm") == picture("2.ppm") && picture("1.ppm") == picture("7.ppm"));
 }
 
 #[test]
 fn a_closed_pipe_is_no_panic() {
-    let desk = Desk::new();
-    let mut child = desk.glimt("ball.toml --once").stderr(Stdio::piped()).spawn().expect("it runs");
+    let dir = TestDir::new();
+    let mut child = dir.glimt("ball.toml --once").stderr(Stdio::piped()).spawn().expect("it runs");
     drop(child.stderr.take());
     assert_eq!(child.wait().expect("it ends").code(), Some(0));
-    let mut child = desk.glimt("check ball.toml").stdout(Stdio::piped()).spawn().expect("it runs");
+    let mut child = dir.glimt("check ball.toml").stdout(Stdio::piped()).spawn().expect("it runs");
     drop(child.stdout.take());
     assert_eq!(child.wait().expect("it ends").code(), Some(0));
 }
@@ -455,9 +455,9 @@ fn a_closed_pipe_is_no_panic() {
 #[test]
 fn signals_end_it_with_their_code_and_leave_the_picture() {
     for (name, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
-        let desk = Desk::new();
-        desk.write("ball.png", "the old one");
-        let mut child = desk
+        let dir = TestDir::new();
+        dir.write("ball.png", "the old one");
+        let mut child = dir
             .glimt("ball.toml --once -o ball.png --samples 4000000 --progress json")
             .stderr(Stdio::piped())
             .spawn()
@@ -467,9 +467,9 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
         let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
         assert!(killed.expect("kill runs").success());
         assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name}");
-        assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
-        assert!(desk.path("ball.png.checkpoint").is_file());
-        assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 3, "no temporary file");
+        assert_eq!(fs::read(dir.path("ball.png")).expect("there"), b"the old one");
+        assert!(dir.path("ball.png.checkpoint").is_file());
+        assert_eq!(fs::read_dir(dir.0.path()).expect("a folder").count(), 3, "no temporary file");
     }
 }
 
@@ -489,14 +489,14 @@ fn an_end_by_a_signal_is_said() {
         ("HUP", 129, ""),
     ] {
         for progress in ["plain", "none"] {
-            let desk = Desk::new();
-            let stderr = fs::File::create(desk.path("stderr")).expect("a file");
-            let mut child = desk
+            let dir = TestDir::new();
+            let stderr = fs::File::create(dir.path("stderr")).expect("a file");
+            let mut child = dir
                 .glimt(&format!("ball.toml --once --samples 4000000 --threads 1 --progress {progress}"))
                 .stderr(stderr)
                 .spawn()
                 .expect("it runs");
-            let said = || fs::read_to_string(desk.path("stderr")).expect("there");
+            let said = || fs::read_to_string(dir.path("stderr")).expect("there");
             // Silent progress gives no sign that the handlers are installed.
             let sign = if progress == "plain" { "photons" } else { "" };
             let start = Instant::now();
@@ -516,16 +516,16 @@ fn an_end_by_a_signal_is_said() {
 
 #[test]
 fn new_writes_to_stdout_where_the_file_is_a_dash() {
-    let desk = Desk::new();
-    let output = desk.run("new -");
+    let dir = TestDir::new();
+    let output = dir.run("new -");
     assert_eq!(output.status.code(), Some(0));
     assert_eq!(output.stdout, glimt::scene::starter().as_bytes());
     assert!(output.stderr.is_empty());
-    assert!(!desk.path("-").exists());
-    desk.expect("new ./-", 0);
-    assert_eq!(desk.bytes("-"), glimt::scene::starter().as_bytes());
+    assert!(!dir.path("-").exists());
+    dir.expect("new ./-", 0);
+    assert_eq!(dir.bytes("-"), glimt::scene::starter().as_bytes());
     // A scene on stdout has no place beside it: whoever asked for a schema there hears how to get it.
-    let output = desk.run("new --schema -");
+    let output = dir.run("new --schema -");
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
     let said = String::from_utf8(output.stderr).expect("UTF-8");

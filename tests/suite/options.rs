@@ -10,7 +10,7 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use super::desk::{Desk, SCENE};
+use super::test_dir::{TestDir, SCENE};
 
 /// A lamp with an extent, a mirror, a lens: something for every option.
 const ROOM: &str = r#"[render]
@@ -62,17 +62,17 @@ v = [0, 0, 1]
 material = "lamp"
 "#;
 
-fn room() -> Desk {
-    let desk = Desk::new();
-    desk.write("room.toml", ROOM);
-    desk
+fn room() -> TestDir {
+    let dir = TestDir::new();
+    dir.write("room.toml", ROOM);
+    dir
 }
 
 /// The bytes of the picture with these options.
 #[track_caller]
-fn picture(desk: &Desk, options: &str) -> Vec<u8> {
-    desk.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
-    desk.bytes("picture.ppm")
+fn picture(dir: &TestDir, options: &str) -> Vec<u8> {
+    dir.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
+    dir.bytes("picture.ppm")
 }
 
 /// The pixels of a PPM of 8 bits.
@@ -82,9 +82,9 @@ fn pixels(ppm: &[u8], count: usize) -> &[u8] {
 
 #[test]
 fn each_option_changes_the_picture_and_is_told_by_the_report() {
-    let desk = room();
-    let plain = picture(&desk, "");
-    assert_eq!(plain, picture(&desk, ""), "twice the same");
+    let dir = room();
+    let plain = picture(&dir, "");
+    assert_eq!(plain, picture(&dir, ""), "twice the same");
     let cases: [(&str, &str, serde_json::Value); 8] = [
         ("--shadows hard", "shadows", "hard".into()),
         ("--shadows off", "shadows", "off".into()),
@@ -96,12 +96,12 @@ fn each_option_changes_the_picture_and_is_told_by_the_report() {
         ("--view shadow", "view", "shadow".into()),
     ];
     for (option, key, value) in cases {
-        assert_ne!(picture(&desk, option), plain, "{option}");
-        let report = desk.report(&format!("room.toml {option}"));
+        assert_ne!(picture(&dir, option), plain, "{option}");
+        let report = dir.report(&format!("room.toml {option}"));
         assert_eq!(report["settings"][key], value, "{option}");
     }
     for option in ["--max-depth 0", "--max-depth 1", "--samples 3"] {
-        assert_ne!(picture(&desk, option), plain, "{option}");
+        assert_ne!(picture(&dir, option), plain, "{option}");
     }
     for same in [
         "--seed 3",
@@ -117,24 +117,24 @@ fn each_option_changes_the_picture_and_is_told_by_the_report() {
         "--preview none",
         "--photons off",
     ] {
-        assert_eq!(picture(&desk, same), plain, "{same}");
+        assert_eq!(picture(&dir, same), plain, "{same}");
     }
 }
 
 #[test]
 fn what_the_call_sets_is_rendered_as_if_the_file_said_it() {
-    let desk = room();
+    let dir = room();
     let sets = "--set materials.ball.diffuse=[0.1,0.2,0.3] --set sphere.2.radius=.4 --set render.samples=3";
-    let by_call = picture(&desk, sets);
+    let by_call = picture(&dir, sets);
     let edited = ROOM.replace("[0.8, 0.2, 0.1]", "[0.1, 0.2, 0.3]").replace("samples = 2", "samples = 3");
     let (first, second) = edited.split_at(edited.rfind("[[sphere]]").expect("a ball"));
-    desk.write("room.toml", format!("{first}{}", second.replacen("radius = 0.5", "radius = 0.4", 1)));
-    assert_eq!(by_call, picture(&desk, ""));
-    desk.write("room.toml", ROOM);
-    assert_ne!(by_call, picture(&desk, ""));
+    dir.write("room.toml", format!("{first}{}", second.replacen("radius = 0.5", "radius = 0.4", 1)));
+    assert_eq!(by_call, picture(&dir, ""));
+    dir.write("room.toml", ROOM);
+    assert_ne!(by_call, picture(&dir, ""));
     // Options come after it.
-    assert_eq!(picture(&desk, "--set render.samples=5 --samples 2"), picture(&desk, ""));
-    let checked = desk.run("check room.toml --set materials.ball.diffuse=tomatoe");
+    assert_eq!(picture(&dir, "--set render.samples=5 --samples 2"), picture(&dir, ""));
+    let checked = dir.run("check room.toml --set materials.ball.diffuse=tomatoe");
     let words = String::from_utf8(checked.stderr).expect("UTF-8");
     assert_eq!(checked.status.code(), Some(2));
     assert!(words.contains("did you mean \"tomato\"?") && words.contains("--set:1:26"), "{words}");
@@ -142,8 +142,8 @@ fn what_the_call_sets_is_rendered_as_if_the_file_said_it() {
 
 #[test]
 fn depth_decides_which_rays_there_are() {
-    let desk = room();
-    let counters = |depth: u32| desk.report(&format!("room.toml --max-depth {depth}"))["counters"].clone();
+    let dir = room();
+    let counters = |depth: u32| dir.report(&format!("room.toml --max-depth {depth}"))["counters"].clone();
     let (none, direct, deep) = (counters(0), counters(1), counters(8));
     assert_eq!((&none["shadow_rays"], &none["reflected_rays"]), (&0.into(), &0.into()));
     assert!(
@@ -156,15 +156,15 @@ fn depth_decides_which_rays_there_are() {
 
 #[test]
 fn size_samples_and_time() {
-    let desk = room();
-    let report = desk.report("room.toml --width 7 --height 5 --samples 9 -o a.png");
+    let dir = room();
+    let report = dir.report("room.toml --width 7 --height 5 --samples 9 -o a.png");
     assert_eq!((&report["image"]["width"], &report["image"]["height"]), (&7.into(), &5.into()));
     assert_eq!(report["image"]["samples"]["max"], 9);
     let decoder =
-        png::Decoder::new(std::io::BufReader::new(fs::File::open(desk.path("a.png")).expect("a picture")));
+        png::Decoder::new(std::io::BufReader::new(fs::File::open(dir.path("a.png")).expect("a picture")));
     let reader = decoder.read_info().expect("a PNG");
     assert_eq!((reader.info().width, reader.info().height), (7, 5));
-    let report = desk.report("room.toml --samples 4000000000 --time 0.3");
+    let report = dir.report("room.toml --samples 4000000000 --time 0.3");
     assert_eq!(report["image"]["complete"], false);
     assert!(report["seconds"].as_f64() < Some(20.0));
     assert!(report["image"]["samples"]["min"].as_u64() > Some(0));
@@ -172,9 +172,9 @@ fn size_samples_and_time() {
 
 #[test]
 fn a_crop_has_the_pixels_of_the_whole_and_black_around() {
-    let desk = room();
-    let whole = picture(&desk, "");
-    let cut = picture(&desk, "--crop 5,4,10,8");
+    let dir = room();
+    let whole = picture(&dir, "");
+    let cut = picture(&dir, "--crop 5,4,10,8");
     let (whole, cut) = (pixels(&whole, 24 * 18), pixels(&cut, 24 * 18));
     for (index, (a, b)) in whole.chunks(3).zip(cut.chunks(3)).enumerate() {
         let (x, y) = (index % 24, index / 24);
@@ -186,8 +186,8 @@ fn a_crop_has_the_pixels_of_the_whole_and_black_around() {
 
 #[test]
 fn every_format_at_once_and_depth_of_bits() {
-    let desk = room();
-    let report = desk.report("room.toml -o a.png -o a.exr -o a.ppm -o a.hdr -o a.jpg");
+    let dir = room();
+    let report = dir.report("room.toml -o a.png -o a.exr -o a.ppm -o a.hdr -o a.jpg");
     assert_eq!(report["image"]["path"], "a.png");
     for (name, start) in [
         ("a.png", b"\x89PNG\r\n\x1a\n".as_slice()),
@@ -196,19 +196,19 @@ fn every_format_at_once_and_depth_of_bits() {
         ("a.hdr", b"#?RADIANCE"),
         ("a.jpg", b"\xff\xd8\xff"),
     ] {
-        assert!(desk.bytes(name).starts_with(start), "{name}");
-        assert_eq!(image::open(desk.path(name)).map(|image| image.width()).ok(), Some(24), "{name}");
+        assert!(dir.bytes(name).starts_with(start), "{name}");
+        assert_eq!(image::open(dir.path(name)).map(|image| image.width()).ok(), Some(24), "{name}");
     }
     let depth = |option: &str| {
-        desk.report(&format!("room.toml -o depth.png {option}"));
-        image::open(desk.path("depth.png")).expect("a picture").color().bits_per_pixel()
+        dir.report(&format!("room.toml -o depth.png {option}"));
+        image::open(dir.path("depth.png")).expect("a picture").color().bits_per_pixel()
     };
     assert_eq!((depth(""), depth("--bit-depth 8"), depth("--bit-depth 16")), (24, 24, 48));
 }
 
 #[test]
 fn wrong_values_are_answered_with_what_is_expected() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (option, words) in [
         ("--samples abc", "expected a whole number from 1 to 4294967295"),
         ("--samples -1", "expected a whole number from 1 to 4294967295"),
@@ -236,7 +236,7 @@ fn wrong_values_are_answered_with_what_is_expected() {
         ("--set samples=3", "such as render.samples=3"),
         ("other.toml", "glimt renders one at a time"),
     ] {
-        let stderr = desk.expect(&format!("ball.toml --once {option}"), 2);
+        let stderr = dir.expect(&format!("ball.toml --once {option}"), 2);
         assert!(stderr.contains(words), "{option}: {stderr}");
     }
     for (call, words) in [
@@ -248,41 +248,41 @@ fn wrong_values_are_answered_with_what_is_expected() {
              farm",
         ),
     ] {
-        let stderr = desk.expect(call, 2);
+        let stderr = dir.expect(call, 2);
         assert!(stderr.contains(words), "{call}: {stderr}");
     }
-    assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 1, "nothing was written");
+    assert_eq!(fs::read_dir(dir.0.path()).expect("a folder").count(), 1, "nothing was written");
 }
 
 #[test]
 fn targets_are_told_before_the_work() {
-    let desk = Desk::new();
-    std::os::unix::fs::symlink("/dev/full", desk.path("full.png")).expect("a link");
-    let stderr = desk.expect("ball.toml --once -o full.png", 1);
+    let dir = TestDir::new();
+    std::os::unix::fs::symlink("/dev/full", dir.path("full.png")).expect("a link");
+    let stderr = dir.expect("ball.toml --once -o full.png", 1);
     assert!(stderr.contains("cannot write full.png: no space left"), "{stderr}");
     for option in ["-o nowhere/a.png", "--report nowhere/r.json", "--report .", "-o ball.toml/a.png"] {
-        let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
+        let stderr = dir.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
         assert!(stderr.contains("cannot write") && !stderr.contains("os error"), "{option}: {stderr}");
     }
     let long = format!("-o {}.png", "n".repeat(300));
-    let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {long}"), 1);
+    let stderr = dir.expect(&format!("ball.toml --once --samples 4000000000 {long}"), 1);
     assert!(stderr.contains("choose a shorter name"), "{stderr}");
     #[cfg(target_os = "linux")]
     for option in ["-o /proc/a.png", "-o /sys/a.png", "--report /proc/r.json", "--report /sys/r.json"] {
-        let stderr = desk.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
+        let stderr = dir.expect(&format!("ball.toml --once --samples 4000000000 {option}"), 1);
         let words =
             if option.contains("/proc") { "the directory /proc takes no files" } else { "permission denied" };
         assert!(stderr.contains(words), "{option}: {stderr}");
     }
-    let stderr = desk.expect("new nowhere/x.toml", 1);
+    let stderr = dir.expect("new nowhere/x.toml", 1);
     let words = "cannot write nowhere/x.toml: the directory nowhere does not exist; create it or choose another place";
     assert!(stderr.contains(words), "{stderr}");
-    assert_eq!(names(&desk), ["ball.toml", "full.png"]);
+    assert_eq!(names(&dir), ["ball.toml", "full.png"]);
 }
 
 /// Names in the folder, sorted.
-fn names(desk: &Desk) -> Vec<String> {
-    let entries = fs::read_dir(desk.0.path()).expect("a folder");
+fn names(dir: &TestDir) -> Vec<String> {
+    let entries = fs::read_dir(dir.0.path()).expect("a folder");
     let mut names: Vec<String> =
         entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
     names.sort();
@@ -291,7 +291,7 @@ fn names(desk: &Desk) -> Vec<String> {
 
 #[test]
 fn a_new_scene_is_named_like_one() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (name, what) in [
         ("a.png", "a picture"),
         ("a.EXR", "a picture"),
@@ -299,21 +299,21 @@ fn a_new_scene_is_named_like_one() {
         ("a.obj", "a mesh"),
         ("a.glb", "a mesh"),
     ] {
-        let stderr = desk.expect(&format!("new {name}"), 2);
+        let stderr = dir.expect(&format!("new {name}"), 2);
         let words = format!("error: {name} is the name of {what}; scenes end in .toml: glimt new a.toml\n");
         assert_eq!(stderr, words);
     }
-    assert_eq!(names(&desk), ["ball.toml"]);
+    assert_eq!(names(&dir), ["ball.toml"]);
     for name in ["a.toml", "b", "c.scene", "d.TOML"] {
-        desk.expect(&format!("new {name}"), 0);
+        dir.expect(&format!("new {name}"), 0);
     }
 }
 
 #[test]
 fn a_usage_error_keeps_its_lines_whatever_was_typed() {
     use std::os::unix::ffi::OsStrExt;
-    let desk = Desk::new();
-    let mut process = desk.glimt("ball.toml --once --set");
+    let dir = TestDir::new();
+    let mut process = dir.glimt("ball.toml --once --set");
     process.arg(std::ffi::OsStr::from_bytes(b"\xff\x1b[2J=3"));
     let output = process.output().expect("it runs");
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
@@ -324,7 +324,7 @@ fn a_usage_error_keeps_its_lines_whatever_was_typed() {
 
 #[test]
 fn a_word_that_is_no_file_is_taken_for_a_command() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (call, words) in [
         (
             "paint",
@@ -335,15 +335,15 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         ("chek --once", "did you mean `check`?"),
         ("--once compar", "did you mean `compare`?"),
     ] {
-        let stderr = desk.expect(call, 2);
+        let stderr = dir.expect(call, 2);
         assert!(stderr.contains(words) && stderr.lines().count() == 1, "{call}: {stderr}");
     }
     // A word that may be a file is one that does not exist.
     for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
-        assert!(desk.expect(call, 2).contains("there is no such scene file"), "{call}");
+        assert!(dir.expect(call, 2).contains("there is no such scene file"), "{call}");
     }
     // Before the screen opens, too.
-    let stderr = desk.expect("bal.toml", 2);
+    let stderr = dir.expect("bal.toml", 2);
     assert!(
         stderr.contains("there is no such scene file") && stderr.contains("did you mean ball.toml?"),
         "{stderr}"
@@ -354,22 +354,22 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         ("check nofolder/x.toml", "the folder nofolder does not exist"),
         ("quite-another-name.toml", "`glimt new FILE` writes a scene to start from"),
     ] {
-        let stderr = desk.expect(call, 2);
+        let stderr = dir.expect(call, 2);
         assert!(stderr.contains("there is no such scene file") && stderr.contains(words), "{call}: {stderr}");
     }
-    desk.write("paint", SCENE);
-    desk.expect("paint --once -o a.png", 0);
+    dir.write("paint", SCENE);
+    dir.expect("paint --once -o a.png", 0);
 }
 
 /// Without a screen that waits for the file to become a scene.
 #[test]
 fn images_parts_and_checkpoints_are_refused_with_their_info() {
-    let desk = Desk::new();
-    desk.write("ball.toml", SCENE);
-    desk.expect("ball.toml --once -o a.png -o b.exr -o c.hdr -o d.jpg -o e.webp -o f.ppm", 0);
-    desk.expect("ball.toml --once -o h.part --shard 1/2", 0);
-    fs::rename(desk.path("a.png"), desk.path("a.toml")).expect("renamed");
-    desk.write("g.gif", "GIF89a");
+    let dir = TestDir::new();
+    dir.write("ball.toml", SCENE);
+    dir.expect("ball.toml --once -o a.png -o b.exr -o c.hdr -o d.jpg -o e.webp -o f.ppm", 0);
+    dir.expect("ball.toml --once -o h.part --shard 1/2", 0);
+    fs::rename(dir.path("a.png"), dir.path("a.toml")).expect("renamed");
+    dir.write("g.gif", "GIF89a");
     for (file, words) in [
         ("a.toml", "an image (PNG)"),
         ("b.exr", "an image (EXR)"),
@@ -381,13 +381,13 @@ fn images_parts_and_checkpoints_are_refused_with_their_info() {
         ("h.part", "a part of an image or a checkpoint"),
     ] {
         for call in [file.to_owned(), format!("{file} --once"), format!("check {file}")] {
-            let stderr = desk.expect(&call, 2);
+            let stderr = dir.expect(&call, 2);
             assert!(stderr.contains(&format!("this is {words}, not a scene")), "{call}: {stderr}");
             let info = if file == "h.part" { "part 1 of 2, " } else { "ball.toml" };
             assert!(stderr.contains(info) || file == "g.gif", "{call}: {stderr}");
         }
     }
-    let json = desk.expect("a.toml --once --progress json", 2);
+    let json = dir.expect("a.toml --once --progress json", 2);
     assert!(json.lines().all(|line| line.starts_with('{')) && json.contains("an image (PNG)"), "{json}");
 }
 
@@ -395,11 +395,11 @@ fn images_parts_and_checkpoints_are_refused_with_their_info() {
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_do_not_start_are_said_with_the_way_out() {
-    let desk = Desk::new();
-    let glimt = desk.glimt("");
+    let dir = TestDir::new();
+    let glimt = dir.glimt("");
     let mut shell = std::process::Command::new("sh");
     let line = "ulimit -v 2000000; exec \"$0\" ball.toml --once --threads 3000 --progress none";
-    shell.args(["-c", line]).arg(glimt.get_program()).current_dir(desk.0.path());
+    shell.args(["-c", line]).arg(glimt.get_program()).current_dir(dir.0.path());
     let output = shell.output().expect("it runs");
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
     let words = "cannot start 3000 threads: resource temporarily unavailable; use fewer (--threads 1), or raise the limits";
@@ -409,13 +409,13 @@ fn threads_that_do_not_start_are_said_with_the_way_out() {
 
 #[test]
 fn a_dash_is_standard_output_where_that_is_free() {
-    let desk = Desk::new();
-    let output = desk.run("ball.toml --once --report - --progress none");
+    let dir = TestDir::new();
+    let output = dir.run("ball.toml --once --report - --progress none");
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), b"".as_slice()));
     let report: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(report["image"]["path"], "ball.png");
     let (mut ours, theirs) = UnixStream::pair().expect("a socket");
-    let mut command = desk.glimt("ball.toml --once --report - --progress none");
+    let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let mut child = command.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
     // It holds the other end.
     drop(command);
@@ -433,26 +433,26 @@ fn a_dash_is_standard_output_where_that_is_free() {
         ("bench ball.toml --plot -", "use a name that ends in .svg"),
         ("compare ball.png ball.png --diff -", "cannot write -: it has no ending that says its format"),
     ] {
-        let stderr = desk.expect(call, 2);
+        let stderr = dir.expect(call, 2);
         assert!(stderr.contains(words), "{call}: {stderr}");
     }
-    assert_eq!(names(&desk), ["ball.png", "ball.toml"]);
+    assert_eq!(names(&dir), ["ball.png", "ball.toml"]);
     // By its path it is a file like others.
-    desk.expect("ball.toml --once --report ./-", 0);
-    assert!(desk.bytes("-").starts_with(b"{"));
+    dir.expect("ball.toml --once --report ./-", 0);
+    assert!(dir.bytes("-").starts_with(b"{"));
 }
 
 #[test]
 fn a_signal_ends_a_report_that_nobody_reads() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let (reader, mut writer) = std::io::pipe().expect("a pipe");
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("set");
     while writer.write(&[0; 4096]).is_ok() {}
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::empty())).expect("set");
-    let mut command = desk.glimt("ball.toml --once --report - --progress none");
+    let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("it runs");
     // The picture comes first.
-    while !desk.path("ball.png").exists() {
+    while !dir.path("ball.png").exists() {
         std::thread::yield_now();
     }
     kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).expect("it is there");
@@ -470,9 +470,9 @@ fn a_signal_ends_a_report_that_nobody_reads() {
 
 #[test]
 fn results_that_cannot_be_written_are_told_and_a_reader_that_has_enough_is_not() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for seed in [1, 2] {
-        desk.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);
+        dir.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);
     }
     let bench = "bench ball.toml --samples 1 --reference-samples 4 --seeds 1 --no-cache --integrator path --progress none";
     for line in [
@@ -487,14 +487,14 @@ fn results_that_cannot_be_written_are_told_and_a_reader_that_has_enough_is_not()
         "ball.toml --once --progress none --report -",
     ] {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("a device");
-        let output = desk.glimt(line).stdout(full).output().expect("it runs");
+        let output = dir.glimt(line).stdout(full).output().expect("it runs");
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
         assert!(
             stderr.contains("no space left on device") && stderr.lines().count() == 1,
             "{line}: {stderr}"
         );
-        let mut process = desk.glimt(line);
+        let mut process = dir.glimt(line);
         let mut child = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
         drop(child.stdout.take());
         let output = child.wait_with_output().expect("it ends");
@@ -510,15 +510,15 @@ fn results_that_cannot_be_written_are_told_and_a_reader_that_has_enough_is_not()
 
 #[test]
 fn help_fits_and_names_every_option() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for line in ["--help", "-h", "check --help", "new --help"] {
-        let output = desk.run(line);
+        let output = dir.run(line);
         let text = String::from_utf8(output.stdout).expect("UTF-8");
         let longest = text.lines().map(|line| line.chars().count()).max().expect("lines");
         assert!(longest <= 100, "{line}: {longest}\n{text}");
         assert!(output.stderr.is_empty() && !text.contains('\u{1b}'));
     }
-    let text = String::from_utf8(desk.run("--help").stdout).expect("UTF-8");
+    let text = String::from_utf8(dir.run("--help").stdout).expect("UTF-8");
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let formats =
         "The ending chooses the format: png, exr, hdr, jpg, ppm, webp; with --turntable also gif, apng.";
@@ -554,38 +554,38 @@ fn help_fits_and_names_every_option() {
 
 #[test]
 fn progress_plain_and_none_and_color() {
-    let desk = room();
-    let plain = desk.expect("room.toml --once --progress plain", 0);
+    let dir = room();
+    let plain = dir.expect("room.toml --once --progress plain", 0);
     let stages: Vec<&str> = plain.lines().filter_map(|line| line.split_whitespace().next()).collect();
     assert!(
         stages.starts_with(&["parse", "meshes", "textures", "accel", "lights", "photons", "render"]),
         "{plain}"
     );
     assert_eq!(plain, plain.trim_start(), "{plain}");
-    desk.write("room.toml", ROOM.replace("radius = 0.5", "radius = 0"));
-    assert!(!desk.expect("room.toml --once --progress none", 2).is_empty(), "errors are always said");
-    let colored = desk.run("room.toml --once --color truecolor");
+    dir.write("room.toml", ROOM.replace("radius = 0.5", "radius = 0"));
+    assert!(!dir.expect("room.toml --once --progress none", 2).is_empty(), "errors are always said");
+    let colored = dir.run("room.toml --once --color truecolor");
     assert!(String::from_utf8_lossy(&colored.stderr).contains("\u{1b}["));
-    assert!(!desk.expect("room.toml --once --color none", 2).contains('\u{1b}'));
+    assert!(!dir.expect("room.toml --once --color none", 2).contains('\u{1b}'));
 }
 
 #[test]
 fn what_failed_is_not_called_loaded() {
-    let desk = Desk::new();
-    desk.write("bad.obj", "v 0 0 0\n");
-    desk.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"bad.obj\"\nmaterial = \"ball\"\n"));
-    let stderr = desk.expect("ball.toml --once --progress plain", 2);
+    let dir = TestDir::new();
+    dir.write("bad.obj", "v 0 0 0\n");
+    dir.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"bad.obj\"\nmaterial = \"ball\"\n"));
+    let stderr = dir.expect("ball.toml --once --progress plain", 2);
     assert!(!stderr.contains("loaded") && stderr.contains("1 failed"), "{stderr}");
 }
 
 #[test]
 fn streams_that_nobody_reads() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for line in
         ["--help", "--version", "check ball.toml", "ball.toml --once", "missing.toml --once", "--nonsense"]
     {
         let mut child =
-            desk.glimt(line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
+            dir.glimt(line).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
         drop((child.stdout.take(), child.stderr.take()));
         let code = child.wait().expect("it ends").code();
         let expected = if ["missing.toml --once", "--nonsense"].contains(&line) { 2 } else { 0 };
@@ -593,7 +593,7 @@ fn streams_that_nobody_reads() {
     }
     // A panic would be heard on the stream that is left.
     let mut child =
-        desk.glimt("check ball.toml").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
+        dir.glimt("check ball.toml").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
     drop(child.stdout.take());
     let mut said = String::new();
     child.stderr.take().expect("piped").read_to_string(&mut said).expect("UTF-8");
@@ -603,14 +603,14 @@ fn streams_that_nobody_reads() {
 
 #[test]
 fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for scene in ["mesh", "textures", "orbiter"] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
         let [boxes, pieces, planes] = ["bvh", "bvh-high", "kdtree"].map(|accel| {
             let size = "--width 96 --height 64 --samples 2 --bit-depth 16";
-            let report = desk.report(&format!("{path} {size} --accel {accel} -o {accel}.png"));
+            let report = dir.report(&format!("{path} {size} --accel {accel} -o {accel}.png"));
             assert_eq!(report["settings"]["accel"], accel);
-            let file = fs::File::open(desk.path(&format!("{accel}.png"))).expect("a picture");
+            let file = fs::File::open(dir.path(&format!("{accel}.png"))).expect("a picture");
             let mut reader = png::Decoder::new(std::io::BufReader::new(file)).read_info().expect("a PNG");
             let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
             reader.next_frame(&mut pixels).expect("pixels");
@@ -623,33 +623,33 @@ fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
 
 #[test]
 fn warnings_point_to_what_asked_for_them() {
-    let desk = room();
+    let dir = room();
     let lit = format!("{ROOM}\n[[light]]\n");
-    desk.write("room.toml", &lit);
+    dir.write("room.toml", &lit);
     let call = "room.toml --once -o picture.ppm --progress none";
     let path = "warning: path finds no light of a [[light]]";
     for (options, place) in [
         ("--integrator path", "= help: this comes of the setting `--integrator path`, not of the scene"),
         ("--set render.integrator=path", "--> --set:1:21"),
     ] {
-        let stderr = desk.expect(&format!("{call} {options}"), 0);
+        let stderr = dir.expect(&format!("{call} {options}"), 0);
         assert!(stderr.contains(path) && stderr.contains(place), "{options}: {stderr}");
         assert!(!stderr.contains("room.toml"), "{options}: {stderr}");
     }
-    let stderr = desk.expect(&format!("{call} --integrator path --clamp 2 --set camera.fov=50"), 0);
+    let stderr = dir.expect(&format!("{call} --integrator path --clamp 2 --set camera.fov=50"), 0);
     assert!(stderr.contains("this comes of the setting `--clamp 2`, not of the scene"), "{stderr}");
-    let stderr = desk.expect(&format!("{call} --view photons"), 0);
+    let stderr = dir.expect(&format!("{call} --view photons"), 0);
     assert!(stderr.contains("this comes of the setting `--view photons`, not of the scene"), "{stderr}");
-    desk.write("room.toml", lit.replace("seed = 3\n", "seed = 3\nintegrator = \"path\"\nclamp = 2\n"));
-    let stderr = desk.expect(call, 0);
+    dir.write("room.toml", lit.replace("seed = 3\n", "seed = 3\nintegrator = \"path\"\nclamp = 2\n"));
+    let stderr = dir.expect(call, 0);
     assert!(stderr.contains("--> room.toml:6:14") && stderr.contains("--> room.toml:7:9"), "{stderr}");
-    let stderr = String::from_utf8(desk.run("check room.toml").stderr).expect("UTF-8");
+    let stderr = String::from_utf8(dir.run("check room.toml").stderr).expect("UTF-8");
     assert!(stderr.contains("--> room.toml:6:14") && stderr.contains("--> room.toml:7:9"), "{stderr}");
 }
 
 #[test]
 fn rough_glass_is_warned_of_where_light_goes_straight_through_it() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let point = "position = [0, 3, 0]";
     let sun = |angle: &str| format!("type = \"directional\"\ndirection = [0, -1, 0]\nangle = {angle}");
     for (ior, light, is_warned) in
@@ -660,8 +660,8 @@ fn rough_glass_is_warned_of_where_light_goes_straight_through_it() {
              [materials.g]\ntype = \"glass\"\nior = {ior}\nroughness = 0.5\n[[sphere]]\nmaterial = \"g\"\n\
              center = [0, 0, 0]\nradius = 1\n[[light]]\n{light}\n"
         );
-        desk.write("ball.toml", ball);
-        let stderr = String::from_utf8(desk.run("check ball.toml").stderr).expect("UTF-8");
+        dir.write("ball.toml", ball);
+        let stderr = String::from_utf8(dir.run("check ball.toml").stderr).expect("UTF-8");
         let is_named = stderr.contains("warning: path finds no light of a [[light]]");
         assert_eq!(is_named, is_warned, "{ior}, {light}: {stderr}");
     }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 
 /// A lamp, a mirror that throws its light, a textured floor: something for every method.
 pub(crate) const ROOM: &str = r#"[render]
@@ -47,37 +47,37 @@ material = "floor"
 const STEP: &str = "v -1.5 0 0\nv -0.6 0 0\nv -1 0.9 -0.2\nf 1 2 3\n";
 const TILES: &str = "P3\n2 2\n255\n200 200 200 40 40 60\n40 40 60 200 200 200\n";
 
-/// A desk with that scene.
-pub(crate) fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.write("room.toml", ROOM);
-    desk.write("step.obj", STEP);
-    desk.write("tiles.ppm", TILES);
-    desk
+/// A dir with that scene.
+pub(crate) fn dir() -> TestDir {
+    let dir = TestDir::new();
+    dir.write("room.toml", ROOM);
+    dir.write("step.obj", STEP);
+    dir.write("tiles.ppm", TILES);
+    dir
 }
 
 #[test]
 fn an_output_replaces_no_part_but_its_own_and_no_checkpoint() {
-    let desk = desk();
+    let dir = dir();
     let first = "room.toml --once --progress none -o out.part --samples 2 --shard 1/2";
-    desk.expect(first, 0);
-    let part = desk.bytes("out.part");
-    let said = desk.expect("room.toml --once --progress none --samples 2 -o out.part --shard 2/2", 2);
+    dir.expect(first, 0);
+    let part = dir.bytes("out.part");
+    let said = dir.expect("room.toml --once --progress none --samples 2 -o out.part --shard 2/2", 2);
     assert!(said.contains("it is part 1/2 of a render") && said.contains("--force"), "{said}");
-    assert!(desk.bytes("out.part") == part);
+    assert!(dir.bytes("out.part") == part);
     // The same part again may, and one of another number.
-    desk.expect("room.toml --once --progress none -o out.part --samples 2 --shard 1/3", 0);
-    desk.expect(first, 0);
+    dir.expect("room.toml --once --progress none -o out.part --samples 2 --shard 1/3", 0);
+    dir.expect(first, 0);
     // A picture replaces neither.
-    fs::rename(desk.path("out.part"), desk.path("out.exr")).expect("moved");
-    let said = desk.expect("room.toml --once --progress none -o out.exr --samples 2", 2);
+    fs::rename(dir.path("out.part"), dir.path("out.exr")).expect("moved");
+    let said = dir.expect("room.toml --once --progress none -o out.exr --samples 2", 2);
     assert!(said.contains("it is part 1/2 of a render"), "{said}");
     let keep = "room.toml --once --progress none -o kept.exr --samples 2 --keep-checkpoint";
-    desk.expect(keep, 0);
-    fs::rename(desk.path("kept.exr.checkpoint"), desk.path("kept.exr")).expect("moved");
-    let said = desk.expect(keep, 2);
+    dir.expect(keep, 0);
+    fs::rename(dir.path("kept.exr.checkpoint"), dir.path("kept.exr")).expect("moved");
+    let said = dir.expect(keep, 2);
     assert!(said.contains("kept.exr: it is a checkpoint"), "{said}");
-    desk.expect(&format!("{keep} --force"), 0);
+    dir.expect(&format!("{keep} --force"), 0);
 }
 
 /// Methods, with a number of samples for each.
@@ -90,11 +90,11 @@ pub(crate) const METHODS: [(&str, &str); 5] = [
 ];
 
 /// Renders all parts; returns their names, the last one first.
-fn parts(desk: &Desk, count: u32, options: &str) -> Vec<String> {
+fn parts(dir: &TestDir, count: u32, options: &str) -> Vec<String> {
     let name = |index: u32| format!("{index}.part");
     for index in 1..=count {
         let part = name(index);
-        desk.expect(
+        dir.expect(
             &format!("room.toml --once --progress none -o {part} --shard {index}/{count} {options}"),
             0,
         );
@@ -104,18 +104,18 @@ fn parts(desk: &Desk, count: u32, options: &str) -> Vec<String> {
 
 #[test]
 fn parts_in_any_order_are_one_render() {
-    let desk = desk();
+    let dir = dir();
     for (method, options) in METHODS {
-        desk.expect(&format!("room.toml --once --progress none -o one.exr -o one.png {options}"), 0);
+        dir.expect(&format!("room.toml --once --progress none -o one.exr -o one.png {options}"), 0);
         for count in [2, 3, 8, 64] {
-            let mut names = parts(&desk, count, options);
+            let mut names = parts(&dir, count, options);
             // Neither in their order nor in its reverse.
             names.rotate_left(count as usize / 3);
             names.swap(0, 1);
             for picture in ["exr", "png"] {
-                desk.expect(&format!("merge joined.{picture} {} --progress none", names.join(" ")), 0);
+                dir.expect(&format!("merge joined.{picture} {} --progress none", names.join(" ")), 0);
                 let (joined, one) =
-                    (desk.bytes(&format!("joined.{picture}")), desk.bytes(&format!("one.{picture}")));
+                    (dir.bytes(&format!("joined.{picture}")), dir.bytes(&format!("one.{picture}")));
                 assert!(joined == one, "{method}: {count} parts, {picture}");
             }
         }
@@ -125,39 +125,39 @@ fn parts_in_any_order_are_one_render() {
 /// The room at 24 samples stops at different numbers of them: the test of `error` would be empty otherwise.
 #[test]
 fn the_noise_threshold_of_that_test_stops_some_tiles_early() {
-    let desk = desk();
-    let report = desk.report(&format!("room.toml {} -o a.png", METHODS[2].1));
+    let dir = dir();
+    let report = dir.report(&format!("room.toml {} -o a.png", METHODS[2].1));
     let samples = &report["image"]["samples"];
     assert!(samples["min"].as_u64() < samples["max"].as_u64(), "{samples}");
-    let photons = desk.report(&format!("room.toml {} -o a.png --force", METHODS[3].1));
+    let photons = dir.report(&format!("room.toml {} -o a.png --force", METHODS[3].1));
     assert!(photons["photons"]["emitted"].as_u64() > Some(0));
 }
 
 #[test]
 fn views_and_crops_are_joined_too() {
-    let desk = desk();
+    let dir = dir();
     for options in [
         "--view samples --samples 64 --error 0.2",
         "--view error --samples 8",
         "--view depth",
         "--crop 7,3,50,41 --samples 32 --error 0.2 --bit-depth 16 --set render.exposure=1",
     ] {
-        desk.expect(&format!("room.toml --once --progress none -o one.png {options}"), 0);
-        let names = parts(&desk, 3, options);
-        desk.expect(&format!("merge joined.png {} --progress none", names.join(" ")), 0);
-        assert!(desk.bytes("joined.png") == desk.bytes("one.png"), "{options}");
+        dir.expect(&format!("room.toml --once --progress none -o one.png {options}"), 0);
+        let names = parts(&dir, 3, options);
+        dir.expect(&format!("merge joined.png {} --progress none", names.join(" ")), 0);
+        assert!(dir.bytes("joined.png") == dir.bytes("one.png"), "{options}");
     }
 }
 
 #[test]
 fn what_does_not_belong_together_is_named_and_nothing_is_written() {
-    let desk = desk();
-    let names = parts(&desk, 3, "");
-    desk.write("joined.png", "the picture before");
+    let dir = dir();
+    let names = parts(&dir, 3, "");
+    dir.write("joined.png", "the picture before");
     let refused = |line: &str, words: &str| {
-        let said = desk.expect(&format!("merge joined.png {line} --progress none"), 2);
+        let said = dir.expect(&format!("merge joined.png {line} --progress none"), 2);
         assert!(said.contains(words), "{line}: {said}");
-        assert_eq!(desk.bytes("joined.png"), b"the picture before", "{line}");
+        assert_eq!(dir.bytes("joined.png"), b"the picture before", "{line}");
         said
     };
     refused("1.part 3.part", "1 of 3 parts are missing: 2/3");
@@ -165,7 +165,7 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     refused("1.part 2.part none.part", "none.part: ");
     refused("1.part 2.part room.toml", "room.toml: this is neither a part");
     let other = |options: &str, words: &str| {
-        desk.expect(&format!("room.toml --once --progress none -o other.part {options}"), 0);
+        dir.expect(&format!("room.toml --once --progress none -o other.part {options}"), 0);
         refused("1.part other.part 3.part", words);
     };
     other("--shard 2/3 --seed 7", "seed is 7 here and 0 there");
@@ -174,45 +174,45 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     other("--shard 2/3 --set render.exposure=1", "exposure is 1 here and 0 there");
     other("--shard 2/3 --set sphere.1.radius=0.4", "shapes, materials, lights or camera");
     other("--shard 2/4", "it is one of 4 parts here and of 3 there");
-    desk.write("step.obj", STEP.replace("0.9", "0.8"));
+    dir.write("step.obj", STEP.replace("0.9", "0.8"));
     other("--shard 2/3", "step.obj has another content");
-    desk.write("step.obj", STEP);
-    desk.write("tiles.ppm", TILES.replace("200", "201"));
+    dir.write("step.obj", STEP);
+    dir.write("tiles.ppm", TILES.replace("200", "201"));
     other("--shard 2/3", "tiles.ppm has another content");
-    desk.write("tiles.ppm", TILES);
+    dir.write("tiles.ppm", TILES);
     // The same files in another folder are the same picture.
-    fs::create_dir(desk.path("away")).expect("a folder");
+    fs::create_dir(dir.path("away")).expect("a folder");
     for (name, text) in [("room.toml", ROOM), ("step.obj", STEP), ("tiles.ppm", TILES)] {
-        desk.write(&format!("away/{name}"), text);
+        dir.write(&format!("away/{name}"), text);
     }
-    desk.expect("away/room.toml --once --progress none -o other.part --shard 2/3", 0);
-    desk.expect("merge away.png 1.part other.part 3.part --progress none", 0);
+    dir.expect("away/room.toml --once --progress none -o other.part --shard 2/3", 0);
+    dir.expect("merge away.png 1.part other.part 3.part --progress none", 0);
     // Some that are damaged, each named.
-    let whole = desk.bytes("2.part");
+    let whole = dir.bytes("2.part");
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 4;
-    desk.write("flipped.part", flipped);
-    desk.write("cut.part", &whole[..whole.len() - 100]);
+    dir.write("flipped.part", flipped);
+    dir.write("cut.part", &whole[..whole.len() - 100]);
     let said = refused("1.part flipped.part cut.part", "flipped.part: it is damaged");
     assert!(said.contains("cut.part: it is damaged"), "{said}");
     let mut newer = whole;
     newer[12] = 2;
-    desk.write("newer.part", newer);
+    dir.write("newer.part", newer);
     refused("1.part newer.part 3.part", "version 2 of the format");
     // A part never becomes a picture, whatever its name.
-    let said = desk.expect("merge 1.part 2.part 3.part --progress none", 2);
+    let said = dir.expect("merge 1.part 2.part 3.part --progress none", 2);
     assert!(said.contains("1.part"), "{said}");
-    fs::copy(desk.path("1.part"), desk.path("1.png")).expect("copied");
-    let said = desk.expect("merge 1.png 2.part 3.part --progress none", 2);
+    fs::copy(dir.path("1.part"), dir.path("1.png")).expect("copied");
+    let said = dir.expect("merge 1.png 2.part 3.part --progress none", 2);
     assert!(said.contains("cannot write 1.png: it is a part"), "{said}");
-    desk.expect("compare 1.png away.png", 2);
+    dir.expect("compare 1.png away.png", 2);
     // The name of the picture comes first.
-    let said = desk.expect("merge 1.part 2.part 3.part out.png --progress none", 2);
+    let said = dir.expect("merge 1.part 2.part 3.part out.png --progress none", 2);
     assert!(said.contains("cannot write 1.part: it is a part; name the picture first"), "{said}");
     // The second name of the picture is taken for a part.
-    fs::copy(desk.path("away.png"), desk.path("twice.png")).expect("copied");
+    fs::copy(dir.path("away.png"), dir.path("twice.png")).expect("copied");
     for name in ["twice.png", "nowhere.png"] {
-        let said = desk.expect(&format!("merge {name} ./{name} 2.part 3.part --progress none"), 2);
+        let said = dir.expect(&format!("merge {name} ./{name} 2.part 3.part --progress none"), 2);
         let words =
             format!("error: {name} is the picture to write, and is given again as a part: name it once");
         assert!(said.contains(&words) || name == "nowhere.png" && said.contains("nowhere.png: "), "{said}");
@@ -223,92 +223,92 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
 
 #[test]
 fn a_joined_picture_takes_the_place_of_nothing_that_it_is_made_of() {
-    let desk = desk();
-    parts(&desk, 2, "");
+    let dir = dir();
+    parts(&dir, 2, "");
     // A copy elsewhere, as where parts were rendered on other machines.
-    fs::create_dir(desk.path("elsewhere")).expect("a folder");
-    fs::copy(desk.path("tiles.ppm"), desk.path("elsewhere/copy.ppm")).expect("copied");
+    fs::create_dir(dir.path("elsewhere")).expect("a folder");
+    fs::copy(dir.path("tiles.ppm"), dir.path("elsewhere/copy.ppm")).expect("copied");
     for name in ["tiles.ppm", "elsewhere/copy.ppm"] {
         for options in ["", "--watch"] {
-            let said = desk.expect(&format!("merge {name} 1.part 2.part {options} --progress none"), 2);
+            let said = dir.expect(&format!("merge {name} 1.part 2.part {options} --progress none"), 2);
             let reason = format!("cannot write {name}: the parts were rendered from it (tiles.ppm)");
             assert!(said.contains(&reason), "{said}");
-            assert_eq!(desk.bytes(name), TILES.as_bytes());
+            assert_eq!(dir.bytes(name), TILES.as_bytes());
         }
     }
     // One that has changed since, or is not there.
     for content in [Some("P3 1 1 255 9 9 9\n"), None] {
         match content {
-            Some(text) => desk.write("tiles.ppm", text),
-            None => fs::remove_file(desk.path("tiles.ppm")).expect("removed"),
+            Some(text) => dir.write("tiles.ppm", text),
+            None => fs::remove_file(dir.path("tiles.ppm")).expect("removed"),
         };
         for name in ["tiles.ppm", "elsewhere/../tiles.ppm"] {
-            let said = desk.expect(&format!("merge {name} 1.part 2.part --progress none"), 2);
+            let said = dir.expect(&format!("merge {name} 1.part 2.part --progress none"), 2);
             let reason =
                 format!("cannot write {name}: the parts were rendered from a file of that name (tiles.ppm)");
             assert!(said.contains(&reason), "{said}");
-            let left = fs::read_to_string(desk.path("tiles.ppm")).ok();
+            let left = fs::read_to_string(dir.path("tiles.ppm")).ok();
             assert_eq!(left.as_deref(), content);
         }
     }
-    desk.expect("merge joined.ppm 1.part 2.part --progress none", 0);
+    dir.expect("merge joined.ppm 1.part 2.part --progress none", 0);
 }
 
 #[test]
 fn what_is_there_is_joined_if_that_is_asked_for() {
-    let desk = desk();
-    desk.expect("room.toml --once --progress none -o one.exr", 0);
-    parts(&desk, 4, "");
-    let said = desk.expect("merge some.exr 4.part 1.part none.part --partial", 0);
+    let dir = dir();
+    dir.expect("room.toml --once --progress none -o one.exr", 0);
+    parts(&dir, 4, "");
+    let said = dir.expect("merge some.exr 4.part 1.part none.part --partial", 0);
     assert!(
         said.contains("warning: 2 of 4 parts are missing: 2/4, 3/4; the picture is made of the others"),
         "{said}"
     );
-    let said = desk.expect("merge all.exr 4.part 3.part 2.part 1.part --partial", 0);
+    let said = dir.expect("merge all.exr 4.part 3.part 2.part 1.part --partial", 0);
     assert!(!said.contains("missing"), "{said}");
     assert!(
-        desk.bytes("all.exr") == desk.bytes("one.exr") && desk.bytes("some.exr") != desk.bytes("one.exr")
+        dir.bytes("all.exr") == dir.bytes("one.exr") && dir.bytes("some.exr") != dir.bytes("one.exr")
     );
     // Photons: fewer blocks, the same pixels.
-    parts(&desk, 2, "--photons on --samples 32 --set photons.count=100");
-    desk.expect("merge half.exr 1.part --partial --progress none", 0);
-    desk.expect("merge half.exr 1.part --progress none", 2);
+    parts(&dir, 2, "--photons on --samples 32 --set photons.count=100");
+    dir.expect("merge half.exr 1.part --partial --progress none", 0);
+    dir.expect("merge half.exr 1.part --progress none", 2);
 }
 
 #[test]
 fn a_merge_waits_for_parts_and_shows_what_does_not_fit_at_once() {
-    let desk = desk();
-    desk.expect("room.toml --once --progress none -o one.exr", 0);
-    parts(&desk, 2, "");
-    fs::rename(desk.path("2.part"), desk.path("later")).expect("renamed");
-    let mut waiting = desk.glimt("merge joined.exr 1.part 2.part --watch --progress none");
+    let dir = dir();
+    dir.expect("room.toml --once --progress none -o one.exr", 0);
+    parts(&dir, 2, "");
+    fs::rename(dir.path("2.part"), dir.path("later")).expect("renamed");
+    let mut waiting = dir.glimt("merge joined.exr 1.part 2.part --watch --progress none");
     let mut waiting = waiting.spawn().expect("it runs");
     std::thread::sleep(std::time::Duration::from_millis(300));
     assert!(waiting.try_wait().expect("a child").is_none(), "a part is missing");
-    fs::rename(desk.path("later"), desk.path("2.part")).expect("renamed");
+    fs::rename(dir.path("later"), dir.path("2.part")).expect("renamed");
     assert!(waiting.wait().expect("a child").success());
-    assert!(desk.bytes("joined.exr") == desk.bytes("one.exr"));
-    desk.expect("room.toml --once --progress none -o other.part --shard 2/2 --seed 3", 0);
-    let said = desk.expect("merge joined.exr 1.part other.part none.part --watch --progress plain", 2);
+    assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
+    dir.expect("room.toml --once --progress none -o other.part --shard 2/2 --seed 3", 0);
+    let said = dir.expect("merge joined.exr 1.part other.part none.part --watch --progress plain", 2);
     assert!(said.contains("seed is 3 here and 0 there"), "{said}");
 }
 
 #[test]
 fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
-    let desk = desk();
-    desk.expect("room.toml --once --progress none -o one.exr", 0);
-    parts(&desk, 2, "");
-    let whole = desk.bytes("2.part");
+    let dir = dir();
+    dir.expect("room.toml --once --progress none -o one.exr", 0);
+    parts(&dir, 2, "");
+    let whole = dir.bytes("2.part");
     for progress in ["plain", "json"] {
-        desk.write("2.part", "");
-        let mut merge = desk.glimt(&format!("merge joined.exr 1.part 2.part --watch --progress {progress}"));
+        dir.write("2.part", "");
+        let mut merge = dir.glimt(&format!("merge joined.exr 1.part 2.part --watch --progress {progress}"));
         let mut waiting = merge.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
         for length in [0, 7, 100, whole.len() / 2, whole.len() - 1] {
-            desk.write("2.part", &whole[..length]);
+            dir.write("2.part", &whole[..length]);
             std::thread::sleep(std::time::Duration::from_millis(600));
             assert!(waiting.try_wait().expect("a child").is_none(), "{length} bytes are there");
         }
-        desk.write("2.part", &whole);
+        dir.write("2.part", &whole);
         let output = waiting.wait_with_output().expect("a child");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert!(output.status.success(), "{said}");
@@ -317,20 +317,20 @@ fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
             _ => r#""unfinished":["2.part"]"#,
         };
         assert_eq!(said.matches(words).count(), 1, "{said}");
-        assert!(desk.bytes("joined.exr") == desk.bytes("one.exr"));
-        fs::remove_file(desk.path("joined.exr")).expect("removed");
+        assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
+        fs::remove_file(dir.path("joined.exr")).expect("removed");
     }
     // One that is damaged does not become whole.
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 4;
-    desk.write("2.part", flipped);
-    let said = desk.expect("merge joined.exr 1.part 2.part --watch --progress none", 2);
+    dir.write("2.part", flipped);
+    let said = dir.expect("merge joined.exr 1.part 2.part --watch --progress none", 2);
     assert!(said.contains("2.part: it is damaged: the bytes from"), "{said}");
     // Without --watch it is an error at once.
-    desk.write("2.part", &whole[..whole.len() - 1]);
-    let said = desk.expect("merge joined.exr 1.part 2.part --progress none", 2);
+    dir.write("2.part", &whole[..whole.len() - 1]);
+    let said = dir.expect("merge joined.exr 1.part 2.part --progress none", 2);
     assert!(said.contains("2.part: it is damaged: it ends at byte"), "{said}");
-    assert!(!desk.path("joined.exr").exists());
+    assert!(!dir.path("joined.exr").exists());
 }
 
 /// Only a user other than root can test this: root may write everywhere.
@@ -338,14 +338,14 @@ fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
 fn a_merge_replaces_what_a_render_would_and_nothing_else() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
     use std::os::unix::process::CommandExt;
-    let desk = desk();
-    parts(&desk, 2, "");
-    let program = desk.program();
-    let is_root = fs::metadata(desk.0.path()).expect("a folder").uid() == 0;
-    fs::set_permissions(desk.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
+    let dir = dir();
+    parts(&dir, 2, "");
+    let program = dir.program();
+    let is_root = fs::metadata(dir.0.path()).expect("a folder").uid() == 0;
+    fs::set_permissions(dir.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
     let said = |line: &str| {
         let mut process = std::process::Command::new(&program);
-        process.current_dir(desk.0.path()).args(line.split_whitespace());
+        process.current_dir(dir.0.path()).args(line.split_whitespace());
         if is_root {
             process.uid(65534).gid(65534);
         }
@@ -354,13 +354,13 @@ fn a_merge_replaces_what_a_render_would_and_nothing_else() {
     };
     let calls = ["merge NAME 1.part 2.part --progress none", "room.toml --once --progress none -o NAME"];
     for call in calls {
-        let (kept, target) = (desk.path("kept.png"), desk.path("target.png"));
+        let (kept, target) = (dir.path("kept.png"), dir.path("target.png"));
         for path in [&kept, &target] {
             fs::write(path, "the image before").expect("written");
             fs::set_permissions(path, fs::Permissions::from_mode(0o666)).expect("permitted");
         }
-        let _ = fs::remove_file(desk.path("link.png"));
-        symlink("target.png", desk.path("link.png")).expect("a link");
+        let _ = fs::remove_file(dir.path("link.png"));
+        symlink("target.png", dir.path("link.png")).expect("a link");
         // A file that is protected stays.
         fs::set_permissions(&kept, fs::Permissions::from_mode(0o444)).expect("permitted");
         let (code, text) = said(&call.replace("NAME", "kept.png"));
@@ -370,7 +370,7 @@ fn a_merge_replaces_what_a_render_would_and_nothing_else() {
         // A link stays, and its target is replaced.
         let (code, text) = said(&call.replace("NAME", "link.png"));
         assert_eq!(code, Some(0), "{call}: {text}");
-        let link = desk.path("link.png").symlink_metadata().expect("a link");
+        let link = dir.path("link.png").symlink_metadata().expect("a link");
         assert!(link.is_symlink() && fs::read(&target).expect("a file").starts_with(b"\x89PNG"), "{call}");
         let protected = fs::metadata(&target).expect("a file").mode() & 0o777;
         assert_eq!(protected, 0o666, "{call}");
@@ -380,7 +380,7 @@ fn a_merge_replaces_what_a_render_would_and_nothing_else() {
 
 #[test]
 fn what_cannot_be_divided_is_refused_before_the_work() {
-    let desk = desk();
+    let dir = dir();
     for (line, words) in [
         ("--once --shard 1/2", "-o must name its file"),
         ("--once --shard 1/2 -o a.part -o b.part", "-o must name its file"),
@@ -390,44 +390,44 @@ fn what_cannot_be_divided_is_refused_before_the_work() {
         ("--shard 1/2 -o a.part", "--shard needs --once"),
         ("--once --shard 3/2 -o a.part", "expected I/N"),
     ] {
-        let said = desk.expect(&format!("room.toml {line}"), 2);
+        let said = dir.expect(&format!("room.toml {line}"), 2);
         assert!(said.contains(words), "{line}: {said}");
-        assert!(!desk.path("a.part").exists());
+        assert!(!dir.path("a.part").exists());
     }
 }
 
 #[test]
 fn scripts_of_schedulers_are_sound() {
-    let desk = desk();
+    let dir = dir();
     for engine in ["slurm", "parallel", "kubernetes"] {
         let line = format!("farm room.toml -o out.exr --shards 4 --engine {engine} --host a -- --samples 9");
-        let output = desk.run(&line);
+        let output = dir.run(&line);
         assert_eq!(output.status.code(), Some(0), "{engine}");
         let script = String::from_utf8(output.stdout).expect("UTF-8");
         assert!(script.contains("--samples 9") && script.contains("merge"), "{script}");
-        desk.write("script", &script);
+        dir.write("script", &script);
         if engine != "kubernetes" {
             let mut shell = std::process::Command::new("sh");
-            let is_sound = shell.current_dir(desk.0.path()).args(["-n", "script"]).status().expect("a shell");
+            let is_sound = shell.current_dir(dir.0.path()).args(["-n", "script"]).status().expect("a shell");
             assert!(is_sound.success(), "{script}");
         }
     }
-    let said = desk.expect("farm room.toml -o out.xyz --shards 4 --engine slurm", 2);
+    let said = dir.expect("farm room.toml -o out.xyz --shards 4 --engine slurm", 2);
     assert!(said.contains(".xyz is not a format"), "{said}");
-    let said = desk.expect("farm room.toml -o out.exr --shards 4 --engine slurm -- --sample 3", 2);
+    let said = dir.expect("farm room.toml -o out.exr --shards 4 --engine slurm -- --sample 3", 2);
     assert!(said.contains("behind `--`: unexpected argument '--sample'"), "{said}");
-    let said = desk.expect("farm none.toml -o out.exr --shards 4 --engine slurm", 2);
+    let said = dir.expect("farm none.toml -o out.exr --shards 4 --engine slurm", 2);
     assert!(said.contains("none.toml: no such file"), "{said}");
 }
 
 #[test]
 fn a_render_that_needs_more_memory_than_allowed_is_refused_with_the_numbers() {
-    let desk = desk();
-    let said = desk.expect("room.toml --once -o a.png --width 9000 --height 9000 --memory 500MB", 1);
+    let dir = dir();
+    let said = dir.expect("room.toml --once -o a.png --width 9000 --height 9000 --memory 500MB", 1);
     assert!(said.contains("the render needs about 4.1") && said.contains("477 MiB of --memory"), "{said}");
     assert!(!said.contains("render   "), "nothing is rendered: {said}");
-    desk.expect("room.toml --once -o a.png --memory 500MB", 0);
+    dir.expect("room.toml --once -o a.png --memory 500MB", 0);
     let photons = "--photons on --set photons.count=4000000";
-    let said = desk.expect(&format!("room.toml --once -o a.png {photons} --memory 500MB"), 1);
+    let said = dir.expect(&format!("room.toml --once -o a.png {photons} --memory 500MB"), 1);
     assert!(said.contains("photons ") && said.contains("smaller `count`"), "{said}");
 }

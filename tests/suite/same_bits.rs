@@ -2,11 +2,11 @@
 
 use glimt::accel::InstructionSet;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 /// FNV-1a of the bits of a picture's numbers.
-fn hash(desk: &Desk, name: &str) -> u64 {
-    let picture = image::open(desk.path(name)).expect("a picture").to_rgb32f();
+fn hash(dir: &TestDir, name: &str) -> u64 {
+    let picture = image::open(dir.path(name)).expect("a picture").to_rgb32f();
     let bytes = picture.as_raw().iter().flat_map(|x| x.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
@@ -97,8 +97,8 @@ intensity = [9, 9, 9]
 
 #[test]
 fn known_pictures_have_their_bits_by_every_instruction_set() {
-    let desk = Desk::new();
-    desk.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
+    let dir = TestDir::new();
+    dir.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
     let known: [(&str, &str, u64); 5] = [
         ("box", "whitted", 0x4b6e_6c5d_51e6_0310),
         ("tent", "whitted", 0x57e4_fc6c_bab8_6693),
@@ -130,11 +130,11 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
         }
         tried.push(instructions);
         for (number, (text, expected)) in known.iter().enumerate() {
-            desk.write("all.toml", text);
-            let mut process = desk.glimt("all.toml --once -o all.exr");
+            dir.write("all.toml", text);
+            let mut process = dir.glimt("all.toml --once -o all.exr");
             let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
             assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-            let found = hash(&desk, "all.exr");
+            let found = hash(&dir, "all.exr");
             if found != *expected {
                 wrong.push(format!("number {number} by {name}: {found:#018x}"));
             }
@@ -219,21 +219,21 @@ intensity = [9, 9, 9]
 
 #[test]
 fn materials_have_the_same_bits_by_every_instruction_set() {
-    let desk = Desk::new();
-    desk.write(
+    let dir = TestDir::new();
+    dir.write(
         "waves.ppm",
         "P3 3 3 255 0 20 90 250 100 30 90 10 200 80 90 100 30 20 10 200 210 220 9 100 80 140 50 60 70 200 3",
     );
     for integrator in ["whitted", "path"] {
-        desk.write("materials.toml", MATERIALS.replace("INTEGRATOR", integrator));
+        dir.write("materials.toml", MATERIALS.replace("INTEGRATOR", integrator));
         let sets = [InstructionSet::Portable, InstructionSet::Avx2, InstructionSet::Avx512];
         let names = ["portable", "avx2", "avx512"];
         let pictures =
             sets.into_iter().zip(names).filter(|(set, _)| set.available() == *set).map(|(_, name)| {
-                let mut process = desk.glimt("materials.toml --once -o materials.exr");
+                let mut process = dir.glimt("materials.toml --once -o materials.exr");
                 let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
                 assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-                (name, hash(&desk, "materials.exr"))
+                (name, hash(&dir, "materials.exr"))
             });
         let pictures: Vec<(&str, u64)> = pictures.collect();
         assert!(pictures.iter().all(|(_, bits)| *bits == pictures[0].1), "{integrator}: {pictures:x?}");
@@ -261,10 +261,10 @@ fn uneven_floor(steps: u32) -> String {
 
 #[test]
 fn trees_of_boxes_and_of_planes_give_the_same_pictures_by_photons() {
-    let desk = Desk::new();
-    desk.write("fine.obj", uneven_floor(40));
-    desk.write("coarse.obj", uneven_floor(6));
-    desk.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n");
+    let dir = TestDir::new();
+    dir.write("fine.obj", uneven_floor(40));
+    dir.write("coarse.obj", uneven_floor(6));
+    dir.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 4 8 7 3\nf 1 5 8 4\nf 2 3 7 6\n");
     for floor in ["fine", "coarse"] {
         let scene = format!(
             "[render]\nwidth = 48\nheight = 48\nsamples = 4\nmax_depth = 6\n[photons]\nenabled = true\ncount = 20000\n\
@@ -274,11 +274,11 @@ fn trees_of_boxes_and_of_planes_give_the_same_pictures_by_photons() {
              [[mesh]]\nfile = \"cube.obj\"\nmaterial = \"floor\"\ntranslate = [-1.6, 0, -0.4]\nrotate = [0, 20, 0]\n\
              [[mesh]]\nfile = \"cube.obj\"\nmaterial = \"glass\"\ntranslate = [0.1, 0.1, -0.5]\nrotate = [0, 50, 0]\nsmooth = false\n"
         );
-        desk.write("scene.toml", scene);
+        dir.write("scene.toml", scene);
         let of = |accel: &str| {
-            let output = desk.run(&format!("scene.toml --once -o all.exr --accel {accel}"));
+            let output = dir.run(&format!("scene.toml --once -o all.exr --accel {accel}"));
             assert!(output.status.success(), "{accel}: {}", String::from_utf8_lossy(&output.stderr));
-            hash(&desk, "all.exr")
+            hash(&dir, "all.exr")
         };
         let by_boxes = of("bvh");
         assert_eq!([of("bvh-high"), of("kdtree")], [by_boxes; 2], "{floor}");
@@ -288,9 +288,9 @@ fn trees_of_boxes_and_of_planes_give_the_same_pictures_by_photons() {
 #[test]
 fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
     const KNOWN: u64 = 0x777f_28d8_83fa_7d9c;
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");
-    desk.write("all.toml", format!("{text}[photons]\nenabled = true\ncount = 5000\n"));
+    dir.write("all.toml", format!("{text}[photons]\nenabled = true\ncount = 5000\n"));
     let mut wrong = Vec::new();
     for (name, instructions) in [
         ("portable", InstructionSet::Portable),
@@ -301,10 +301,10 @@ fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
             continue;
         }
         for threads in [1, 2, 7] {
-            let mut process = desk.glimt(&format!("all.toml --once -o all.exr --threads {threads}"));
+            let mut process = dir.glimt(&format!("all.toml --once -o all.exr --threads {threads}"));
             let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
             assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-            let found = hash(&desk, "all.exr");
+            let found = hash(&dir, "all.exr");
             if found != KNOWN {
                 wrong.push(format!("{name}, {threads} threads: {found:#018x}"));
             }

@@ -6,11 +6,11 @@ use std::process::Command;
 
 use glimt::cli::environment::VARIABLES;
 
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 use crate::terminal::pty::Folder;
 
 /// The candidates of bash for a line, whose last word is being typed.
-fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
+fn in_bash(dir: &TestDir, line: &str) -> Vec<String> {
     // As bash does when the key is pressed; `=` ends a word there.
     let script = r#"
         source <(glimt completions bash)
@@ -20,13 +20,13 @@ fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
         _glimt_complete glimt "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"
         printf '%s\n' "${COMPREPLY[@]}"
     "#;
-    let program = desk.glimt("").get_program().to_owned();
+    let program = dir.glimt("").get_program().to_owned();
     let folder = std::path::Path::new(&program).parent().expect("a folder").to_owned();
     let path = std::env::join_paths(
         [folder].into_iter().chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
     );
     let mut bash = Command::new("bash");
-    bash.args(["--norc", "-c", script, "bash", line]).current_dir(desk.0.path());
+    bash.args(["--norc", "-c", script, "bash", line]).current_dir(dir.0.path());
     let output = bash.env("PATH", path.expect("a path")).output().expect("bash");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = String::from_utf8(output.stdout).expect("UTF-8");
@@ -35,28 +35,28 @@ fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
 
 #[test]
 fn bash_completes_commands_scenes_models_and_keys_of_the_scene() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for name in ["knot.obj", "notes.txt", "view.png"] {
-        desk.write(name, "");
+        dir.write(name, "");
     }
-    fs::create_dir(desk.path("more")).expect("a folder");
-    let first = in_bash(&desk, "glimt ");
+    fs::create_dir(dir.path("more")).expect("a folder");
+    let first = in_bash(&dir, "glimt ");
     for wanted in ["check", "doctor", "ball.toml", "knot.obj", "more/"] {
         assert!(first.iter().any(|word| word == wanted), "{wanted}: {first:?}");
     }
     assert!(!first.iter().any(|word| ["notes.txt", "view.png"].contains(&word.as_str())), "{first:?}");
-    assert_eq!(in_bash(&desk, "glimt check k"), [""; 0], "only scenes are checked");
-    assert_eq!(in_bash(&desk, "glimt compl"), ["completions"]);
-    assert_eq!(in_bash(&desk, "glimt ball.toml --integrator "), ["whitted", "path"]);
-    assert_eq!(in_bash(&desk, "glimt ball.toml --set materials.ball.d"), ["materials.ball.diffuse="]);
-    assert_eq!(in_bash(&desk, "glimt check ball.toml --set light.1.f"), ["light.1.falloff="]);
-    assert_eq!(in_bash(&desk, "glimt ball.toml --set photons.e"), ["photons.enabled="]);
+    assert_eq!(in_bash(&dir, "glimt check k"), [""; 0], "only scenes are checked");
+    assert_eq!(in_bash(&dir, "glimt compl"), ["completions"]);
+    assert_eq!(in_bash(&dir, "glimt ball.toml --integrator "), ["whitted", "path"]);
+    assert_eq!(in_bash(&dir, "glimt ball.toml --set materials.ball.d"), ["materials.ball.diffuse="]);
+    assert_eq!(in_bash(&dir, "glimt check ball.toml --set light.1.f"), ["light.1.falloff="]);
+    assert_eq!(in_bash(&dir, "glimt ball.toml --set photons.e"), ["photons.enabled="]);
 }
 
 #[test]
 fn real_shells_complete_what_is_typed() {
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/shells.py");
-    let output = Command::new("python3").arg(script).arg(Desk::new().glimt("").get_program()).output();
+    let output = Command::new("python3").arg(script).arg(TestDir::new().glimt("").get_program()).output();
     let output = output.expect("python3");
     let said = String::from_utf8(output.stdout).expect("UTF-8");
     println!("{said}");
@@ -65,7 +65,7 @@ fn real_shells_complete_what_is_typed() {
 
 #[test]
 fn every_shell_has_its_script() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (shell, mark) in [
         ("bash", "complete -o nospace"),
         ("zsh", "#compdef glimt"),
@@ -73,20 +73,20 @@ fn every_shell_has_its_script() {
         ("powershell", "Register-ArgumentCompleter"),
         ("elvish", "edit:completion:arg-completer[glimt]"),
     ] {
-        let output = desk.run(&format!("completions {shell}"));
+        let output = dir.run(&format!("completions {shell}"));
         let script = String::from_utf8(output.stdout).expect("UTF-8");
         assert!(output.status.success() && script.contains(mark), "{shell}: {script}");
         assert!(script.contains("GLIMT_COMPLETE"), "{shell}: {script}");
     }
     assert!(
-        desk.expect("completions tcsh", 2).contains("[possible values: bash, zsh, fish, powershell, elvish]")
+        dir.expect("completions tcsh", 2).contains("[possible values: bash, zsh, fish, powershell, elvish]")
     );
 }
 
 #[test]
 fn the_manual_has_every_command_option_and_variable() {
-    let desk = Desk::new();
-    let page = |line: &str| String::from_utf8(desk.run(line).stdout).expect("UTF-8").replace("\\-", "-");
+    let dir = TestDir::new();
+    let page = |line: &str| String::from_utf8(dir.run(line).stdout).expect("UTF-8").replace("\\-", "-");
     let whole = page("man");
     for part in [
         ".TH glimt 1",
@@ -104,23 +104,23 @@ fn the_manual_has_every_command_option_and_variable() {
     let check = page("man check");
     assert!(check.contains(".TH glimt-check 1") && check.contains("--set"), "{check}");
     assert!(!check.contains("--checkpoint"));
-    assert!(desk.expect("man chekc", 2).contains("did you mean `check`?"));
+    assert!(dir.expect("man chekc", 2).contains("did you mean `check`?"));
 }
 
 #[test]
 fn a_call_without_a_word_leads_to_a_scene() {
-    let desk = Desk::new();
-    let said = desk.expect("", 2);
+    let dir = TestDir::new();
+    let said = dir.expect("", 2);
     assert!(said.contains("glimt new ball.toml") && said.contains("glimt -h"), "{said}");
     assert!(said.lines().count() < 10, "{said}");
     // An option alone is a call that lacks its scene.
-    assert!(desk.expect("--once", 2).contains("<SCENE>"));
+    assert!(dir.expect("--once", 2).contains("<SCENE>"));
 }
 
 #[test]
 fn the_long_help_names_the_environment_and_the_short_one_does_not() {
-    let desk = Desk::new();
-    let help = |option: &str| String::from_utf8(desk.run(option).stdout).expect("UTF-8");
+    let dir = TestDir::new();
+    let help = |option: &str| String::from_utf8(dir.run(option).stdout).expect("UTF-8");
     let (long, short) = (help("--help"), help("-h"));
     for (names, _) in VARIABLES {
         assert!(long.contains(names), "{names}");
@@ -175,9 +175,9 @@ fn the_list_of_variables_has_what_the_sources_ask_for() {
 
 #[test]
 fn doctor_reports_without_a_terminal() {
-    let desk = Desk::new();
-    let mut glimt = desk.glimt("doctor");
-    glimt.env("GLIMT_SIMD", "portable").env("XDG_CACHE_HOME", desk.path("cache")).env("VISUAL", "hx");
+    let dir = TestDir::new();
+    let mut glimt = dir.glimt("doctor");
+    glimt.env("GLIMT_SIMD", "portable").env("XDG_CACHE_HOME", dir.path("cache")).env("VISUAL", "hx");
     let output = glimt.output().expect("it runs");
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(output.status.success(), "{text}");

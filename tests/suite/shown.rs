@@ -5,15 +5,15 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::desk::{Desk, PROGRAM};
+use super::test_dir::{TestDir, PROGRAM};
 use super::gltf::{Glb, cube, cubes};
 
 const SMALL: &str = "--once --force --width 48 --height 36 --samples 4 --error 0";
 
 /// A picture's linear values.
-fn picture(desk: &Desk, line: &str) -> Vec<f32> {
-    desk.expect(&format!("{line} {SMALL} -o picture.exr"), 0);
-    image::open(desk.path("picture.exr")).expect("a picture").to_rgb32f().into_raw()
+fn picture(dir: &TestDir, line: &str) -> Vec<f32> {
+    dir.expect(&format!("{line} {SMALL} -o picture.exr"), 0);
+    image::open(dir.path("picture.exr")).expect("a picture").to_rgb32f().into_raw()
 }
 
 fn checker() -> Vec<u8> {
@@ -45,11 +45,11 @@ fn covered(pixels: &[f32]) -> [usize; 4] {
 
 #[test]
 fn a_model_is_framed_from_every_side() {
-    let desk = Desk::new();
-    desk.write("box.obj", box_of([3, 2, 1]));
+    let dir = TestDir::new();
+    dir.write("box.obj", box_of([3, 2, 1]));
     for (side, ratio) in [("front", 1.5), ("back", 1.5), ("left", 0.5), ("right", 0.5)] {
         let [left, right, top, bottom] =
-            covered(&picture(&desk, &format!("box.obj --view normal --from {side}")));
+            covered(&picture(&dir, &format!("box.obj --view normal --from {side}")));
         let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
         assert!(left > 0 && top > 0 && right < 47 && bottom < 35, "{side}: {left} {right} {top} {bottom}");
         assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
@@ -57,30 +57,30 @@ fn a_model_is_framed_from_every_side() {
     }
     // A tower along each axis stands upright by --up; Blender's PLY files have z up.
     for (up, sizes) in [("x", [4, 1, 1]), ("y", [1, 4, 1]), ("z", [1, 1, 4])] {
-        desk.write("tower.obj", box_of(sizes));
+        dir.write("tower.obj", box_of(sizes));
         let [left, right, top, bottom] =
-            covered(&picture(&desk, &format!("tower.obj --view normal --from front --up {up}")));
+            covered(&picture(&dir, &format!("tower.obj --view normal --from front --up {up}")));
         let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
         assert!((3.0..5.0).contains(&(height / width)), "{up}: {width} × {height}");
     }
     let tower = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n\
                  property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 0 4\n0 0 4\n3 0 1 2\n3 0 2 3\n";
     for (comment, is_high) in [("Created in Blender version 4.5.0", true), ("by hand", false)] {
-        desk.write("tower.ply", format!("ply\nformat ascii 1.0\ncomment {comment}\n{tower}"));
-        let [left, right, top, bottom] = covered(&picture(&desk, "tower.ply --view normal --from iso"));
+        dir.write("tower.ply", format!("ply\nformat ascii 1.0\ncomment {comment}\n{tower}"));
+        let [left, right, top, bottom] = covered(&picture(&dir, "tower.ply --view normal --from iso"));
         assert_eq!(bottom - top > right - left, is_high, "{comment}");
     }
-    let stderr = desk.expect(&format!("ball.toml {SMALL} --up z"), 2);
+    let stderr = dir.expect(&format!("ball.toml {SMALL} --up z"), 2);
     assert!(stderr.contains("--up is for models"), "{stderr}");
-    let stderr = desk.expect(&format!("ball.toml {SMALL} --from top"), 2);
+    let stderr = dir.expect(&format!("ball.toml {SMALL} --from top"), 2);
     assert!(stderr.contains("--from is for models"), "{stderr}");
 }
 
 /// The same shape in a format that counts z upwards stands as the one that counts y upwards.
 #[test]
 fn stl_files_stand_on_their_ground() {
-    let desk = Desk::new();
-    desk.write("box.obj", box_of([3, 2, 1]));
+    let dir = TestDir::new();
+    dir.write("box.obj", box_of([3, 2, 1]));
     // Of x, y and z: the width, the depth to the back, the height.
     let facets = box_of([3, 1, 2]);
     let corners: Vec<&str> = facets.lines().filter_map(|line| line.strip_prefix("v ")).collect();
@@ -92,21 +92,21 @@ fn stl_files_stand_on_their_ground() {
             .collect();
         format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
     };
-    desk.write("box.stl", format!("solid box\n{}endsolid box\n", faces.map(facet).collect::<String>()));
+    dir.write("box.stl", format!("solid box\n{}endsolid box\n", faces.map(facet).collect::<String>()));
     let [obj, stl] = ["box.obj", "box.stl"]
-        .map(|file| covered(&picture(&desk, &format!("{file} --view normal --from front"))));
+        .map(|file| covered(&picture(&dir, &format!("{file} --view normal --from front"))));
     assert_eq!(obj, stl);
 }
 
 #[test]
 fn an_import_is_the_picture_of_the_model() {
-    let desk = Desk::new();
-    desk.write("cubes.glb", cubes(&checker()));
-    let shown = picture(&desk, "cubes.glb");
-    let said = desk.expect("import cubes.glb -o scene.toml", 0);
+    let dir = TestDir::new();
+    dir.write("cubes.glb", cubes(&checker()));
+    let shown = picture(&dir, "cubes.glb");
+    let said = dir.expect("import cubes.glb -o scene.toml", 0);
     assert!(said.contains("wrote scene.toml, and 2 files in scene_files"), "{said}");
-    assert_eq!(picture(&desk, "scene.toml"), shown);
-    let text = fs::read_to_string(desk.path("scene.toml")).expect("a scene");
+    assert_eq!(picture(&dir, "scene.toml"), shown);
+    let text = fs::read_to_string(dir.path("scene.toml")).expect("a scene");
     for words in [
         "[textures.checks]\nfile = \"scene_files/checks.png\"\nfactor = [1, 0.5, 0.5]\n",
         "[materials.\"paint \\\"1\\\"\"]\ntype = \"principled\"\ncolor = { texture = \"checks\" }\nroughness = 1\n",
@@ -116,20 +116,20 @@ fn an_import_is_the_picture_of_the_model() {
         assert!(text.contains(words), "{words}\nin\n{text}");
     }
     // The image in its folder is the one that was put into the model.
-    assert_eq!(desk.bytes("scene_files/checks.png"), checker());
+    assert_eq!(dir.bytes("scene_files/checks.png"), checker());
     // It never writes over a file or into a folder that is there.
-    let said = desk.expect("import cubes.glb -o scene.toml", 2);
+    let said = dir.expect("import cubes.glb -o scene.toml", 2);
     assert!(said.contains("scene.toml exists already, and is left as it is"), "{said}");
-    fs::remove_file(desk.path("scene.toml")).expect("removed");
-    assert!(desk.expect("import cubes.glb -o scene.toml", 2).contains("scene_files exists already"));
-    assert!(desk.expect("import ball.toml -o b.toml", 2).contains(".gltf or .glb"));
-    assert!(desk.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
+    fs::remove_file(dir.path("scene.toml")).expect("removed");
+    assert!(dir.expect("import cubes.glb -o scene.toml", 2).contains("scene_files exists already"));
+    assert!(dir.expect("import ball.toml -o b.toml", 2).contains(".gltf or .glb"));
+    assert!(dir.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
 }
 
 /// The colour by the first set of coordinates, the emission by the second, as programs with light maps write it.
 #[test]
 fn both_sets_of_coordinates_are_shown_and_imported() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let write = |emission_set: u32| {
         let mut glb = Glb::default();
         let mut cube = cube(&mut glb);
@@ -144,22 +144,22 @@ fn both_sets_of_coordinates_are_shown_and_imported() {
             "textures": [{"source": 0}],
             "images": [{"bufferView": view, "mimeType": "image/png", "name": "checks"}]
         }));
-        desk.write("a.glb", file);
+        dir.write("a.glb", file);
     };
     write(0);
-    let of_one = picture(&desk, "a.glb");
+    let of_one = picture(&dir, "a.glb");
     write(1);
-    let of_both = picture(&desk, "a.glb");
+    let of_both = picture(&dir, "a.glb");
     assert_ne!(of_one, of_both);
-    let said = desk.expect("import a.glb", 0);
+    let said = dir.expect("import a.glb", 0);
     assert!(!said.contains("approximation"), "{said}");
-    assert_eq!(picture(&desk, "a.toml"), of_both);
-    let text = fs::read_to_string(desk.path("a.toml")).expect("a scene");
+    assert_eq!(picture(&dir, "a.toml"), of_both);
+    let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
     assert!(text.contains("[textures.checks_2]\nfile = \"a_files/checks.png\"\nuv = 1\n"), "{text}");
     // A mesh without a second set says so, and shows the first.
-    desk.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
-    desk.write("b.toml", text.replace("a_files/cube.ply", "b.obj"));
-    let said = desk.expect(&format!("b.toml {SMALL} -o b.exr"), 0);
+    dir.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+    dir.write("b.toml", text.replace("a_files/cube.ply", "b.obj"));
+    let said = dir.expect(&format!("b.toml {SMALL} -o b.exr"), 0);
     let words =
         "b.obj has no second set of texture coordinates: \"checks_2\" of \"material\" takes the first";
     assert!(said.contains(words), "{said}");
@@ -180,49 +180,49 @@ fn with_image(uri: &str) -> Vec<u8> {
 /// A file that somebody else made must not carry others of this machine into the folder of a scene.
 #[test]
 fn an_import_copies_images_alone() {
-    let desk = Desk::new();
-    desk.write("secret", "root:x:0:0\n");
-    desk.write("secret.png", "root:x:0:0\n");
+    let dir = TestDir::new();
+    dir.write("secret", "root:x:0:0\n");
+    dir.write("secret.png", "root:x:0:0\n");
     for name in ["secret", "secret.png"] {
-        desk.write("a.glb", with_image(name));
-        let said = desk.expect("import a.glb", 2);
+        dir.write("a.glb", with_image(name));
+        let said = dir.expect("import a.glb", 2);
         assert!(said.contains(name) && said.contains("images[0]"), "{said}");
-        assert!(!desk.path("a.toml").exists() && !desk.path("a_files").exists());
+        assert!(!dir.path("a.toml").exists() && !dir.path("a_files").exists());
     }
     // An image without an ending gets that of its content; no name leads out of the folder.
-    desk.write("picture", checker());
-    desk.write("a.glb", with_image("picture"));
-    desk.expect("import a.glb", 0);
-    assert_eq!(desk.bytes("a_files/picture.png"), checker());
-    assert!(desk.path("a_files/_cube.ply").exists());
+    dir.write("picture", checker());
+    dir.write("a.glb", with_image("picture"));
+    dir.expect("import a.glb", 0);
+    assert_eq!(dir.bytes("a_files/picture.png"), checker());
+    assert!(dir.path("a_files/_cube.ply").exists());
 }
 
 /// Files that could not all be written are removed.
 #[test]
 fn an_import_that_fails_leaves_nothing() {
-    let desk = Desk::new();
-    desk.write("cubes.glb", cubes(&checker()));
+    let dir = TestDir::new();
+    dir.write("cubes.glb", cubes(&checker()));
     // The scene's name is taken by a folder that nobody looked for: a link to nowhere is one too.
-    std::os::unix::fs::symlink("nowhere", desk.path("taken.toml")).expect("a link");
-    assert!(desk.expect("import cubes.glb -o taken.toml", 2).contains("taken.toml exists already"));
-    assert!(!desk.path("taken_files").exists());
+    std::os::unix::fs::symlink("nowhere", dir.path("taken.toml")).expect("a link");
+    assert!(dir.expect("import cubes.glb -o taken.toml", 2).contains("taken.toml exists already"));
+    assert!(!dir.path("taken_files").exists());
     // No file may grow beyond a block of 512 bytes.
     let shell = std::process::Command::new("sh")
         .args(["-c", &format!("ulimit -f 1; exec {PROGRAM} import cubes.glb -o full.toml")])
-        .current_dir(desk.path("."))
+        .current_dir(dir.path("."))
         .output()
         .expect("it runs");
     let said = String::from_utf8_lossy(&shell.stderr).into_owned();
     assert_eq!(shell.status.code(), Some(1), "{said}");
     assert!(said.contains("cannot write full_files/") && said.contains("file too large"), "{said}");
-    assert!(!desk.path("full.toml").exists() && !desk.path("full_files").exists());
-    desk.expect("import cubes.glb -o full.toml", 0);
+    assert!(!dir.path("full.toml").exists() && !dir.path("full_files").exists());
+    dir.expect("import cubes.glb -o full.toml", 0);
 }
 
 /// A scene whose numbers no scene takes is not written, and the message names the number of the glTF file.
 #[test]
 fn numbers_beyond_what_scenes_take_are_the_files_own_fault() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let lamp = |intensity: f64| {
         json!({"nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 5, 0]}],
             "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "name": "sun", "intensity": intensity}]}}})
@@ -239,30 +239,30 @@ fn numbers_beyond_what_scenes_take_are_the_files_own_fault() {
     ] {
         let mut glb = Glb::default();
         model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
-        desk.write("a.glb", glb.finish(model));
-        let said = desk.expect("import a.glb --strict", 2);
+        dir.write("a.glb", glb.finish(model));
+        let said = dir.expect("import a.glb --strict", 2);
         assert!(said.contains(words), "{words}: {said}");
-        assert!(!desk.path("a.toml").exists() && !desk.path("a_files").exists(), "{words}");
-        let said = desk.expect(&format!("a.glb {SMALL}"), 2);
+        assert!(!dir.path("a.toml").exists() && !dir.path("a_files").exists(), "{words}");
+        let said = dir.expect(&format!("a.glb {SMALL}"), 2);
         assert!(said.contains(words) && !said.contains("a.glb:"), "{words}: {said}");
     }
     // What is read is a scene that can be checked.
     let mut glb = Glb::default();
     let mut model = lamp(9e14);
     model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
-    desk.write("a.glb", glb.finish(model));
-    desk.expect("import a.glb", 0);
-    assert!(desk.run("check a.toml").status.success());
+    dir.write("a.glb", glb.finish(model));
+    dir.expect("import a.glb", 0);
+    assert!(dir.run("check a.toml").status.success());
 }
 
 #[test]
 fn a_count_that_no_file_holds_is_shown_as_it_is() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let mut glb = Glb::default();
     let cube = cube(&mut glb);
     let text = glb.finish_text(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}]}));
-    desk.write("a.gltf", text.replace("\"count\":36", "\"count\":1000000000000"));
-    let said = desk.expect("import a.gltf", 2);
+    dir.write("a.gltf", text.replace("\"count\":36", "\"count\":1000000000000"));
+    let said = dir.expect("import a.gltf", 2);
     assert!(said.contains("1000000000000 corners"), "{said}");
 }
 
@@ -273,7 +273,7 @@ fn an_interrupted_import_leaves_nothing() {
     use nix::unistd::Pid;
     /// Most imports that may end before the signal.
     const TRIES: u32 = 20;
-    let desk = Desk::new();
+    let dir = TestDir::new();
     // Many parts of some size, so that writing takes a while.
     let mut glb = Glb::default();
     let positions: Vec<[f32; 3]> =
@@ -281,12 +281,12 @@ fn an_interrupted_import_leaves_nothing() {
     // Each has numbers of its own: parts of the same ones would be written once.
     let parts = (0..30).map(|_| json!({"attributes": {"POSITION": glb.vectors(&positions)}}));
     let primitives: Vec<_> = parts.collect();
-    desk.write(
+    dir.write(
         "big.glb",
         glb.finish(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": primitives}]})),
     );
     let hidden = || {
-        let entries = fs::read_dir(desk.path(".")).expect("a folder").flatten();
+        let entries = fs::read_dir(dir.path(".")).expect("a folder").flatten();
         entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(".o.toml.glimt-")).count()
     };
     for (signal, code) in [
@@ -296,7 +296,7 @@ fn an_interrupted_import_leaves_nothing() {
         (Signal::SIGKILL, None),
     ] {
         let run = || {
-            let mut import = desk.glimt("import big.glb -o o.toml");
+            let mut import = dir.glimt("import big.glb -o o.toml");
             let mut child = import.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
             // End it while it writes.
             while hidden() == 0 && child.try_wait().expect("a state").is_none() {
@@ -311,68 +311,68 @@ fn an_interrupted_import_leaves_nothing() {
             if output.status.code() != Some(0) {
                 break;
             }
-            fs::remove_file(desk.path("o.toml")).expect("a whole scene");
-            fs::remove_dir_all(desk.path("o_files")).expect("and its files");
+            fs::remove_file(dir.path("o.toml")).expect("a whole scene");
+            fs::remove_dir_all(dir.path("o_files")).expect("and its files");
             output = run();
         }
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), code, "{signal}: {said}");
-        let is_whole = desk.path("o.toml").exists();
-        assert_eq!(desk.path("o_files").exists(), is_whole, "{signal}: {said}");
+        let is_whole = dir.path("o.toml").exists();
+        assert_eq!(dir.path("o_files").exists(), is_whole, "{signal}: {said}");
         if is_whole {
-            fs::remove_file(desk.path("o.toml")).expect("removed");
-            fs::remove_dir_all(desk.path("o_files")).expect("removed");
+            fs::remove_file(dir.path("o.toml")).expect("removed");
+            fs::remove_dir_all(dir.path("o_files")).expect("removed");
         } else if matches!(signal, Signal::SIGINT | Signal::SIGTERM) {
             assert!(said.contains(&format!("ended by {signal}: nothing was written")), "{said}");
         }
         assert_eq!(hidden(), usize::from(signal == Signal::SIGKILL && !is_whole), "{signal}");
     }
-    desk.expect("import big.glb -o o.toml", 0);
+    dir.expect("import big.glb -o o.toml", 0);
     assert_eq!(hidden(), 0, "what a killed one left is removed");
 }
 
 #[test]
 fn approximations_are_named_counted_and_refused_if_strict() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let mut glb = Glb::default();
     let mut cube = cube(&mut glb);
     cube["material"] = json!(0);
     let extensions = json!({"KHR_materials_sheen": {}});
-    desk.write("a.glb", glb.finish(json!({
+    dir.write("a.glb", glb.finish(json!({
         "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [{"extensions": extensions}], "animations": [{}]
     })));
-    let said = desk.expect("import a.glb -o strict.toml --strict", 1);
+    let said = dir.expect("import a.glb -o strict.toml --strict", 1);
     assert!(
         said.contains("materials[0]: its sheen is left out") && said.contains("2 approximations"),
         "{said}"
     );
-    assert!(!desk.path("strict.toml").exists() && !desk.path("strict_files").exists());
-    desk.expect("import a.glb", 0);
-    let text = fs::read_to_string(desk.path("a.toml")).expect("a scene");
+    assert!(!dir.path("strict.toml").exists() && !dir.path("strict_files").exists());
+    dir.expect("import a.glb", 0);
+    let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
     assert!(
         text.contains(
             "# animations: 1 left out: the model is shown at rest\n# materials[0]: its sheen is left out\n"
         ),
         "{text}"
     );
-    let said = desk.expect(&format!("a.glb {SMALL}"), 0);
+    let said = dir.expect(&format!("a.glb {SMALL}"), 0);
     assert!(said.contains("its sheen is left out"), "{said}");
 }
 
 #[test]
 fn a_model_s_own_cameras_and_lights_count() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let mut glb = Glb::default();
     let cube = cube(&mut glb);
-    desk.write("a.glb", glb.finish(json!({
+    dir.write("a.glb", glb.finish(json!({
         "nodes": [{"mesh": 0}, {"name": "eye", "camera": 0, "translation": [0, 0, 9]},
             {"translation": [0, 5, 5], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
         "meshes": [{"primitives": [cube]}],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "aspectRatio": 2}}],
         "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 40, "color": [1, 0, 0]}]}}
     })));
-    desk.expect("import a.glb", 0);
-    let text = fs::read_to_string(desk.path("a.toml")).expect("a scene");
+    dir.expect("import a.glb", 0);
+    let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
     for words in [
         "width = 960\nheight = 480",
         "position = [0, 0, 9]",
@@ -388,42 +388,42 @@ fn a_model_s_own_cameras_and_lights_count() {
 /// glimt cuts the light by way of polished surfaces, and says so. Other models show all of it.
 #[test]
 fn only_polished_models_are_clamped_and_say_so() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (roughness, is_polished) in [(0.1, true), (0.5, false)] {
         let mut glb = Glb::default();
         let mut cube = cube(&mut glb);
         cube["material"] = json!(0);
-        desk.write(
+        dir.write(
             "a.glb",
             glb.finish(json!({
                 "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}],
                 "materials": [{"pbrMetallicRoughness": {"roughnessFactor": roughness}}]
             })),
         );
-        let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+        let said = dir.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
         assert_eq!(
             said.contains("the light that its polished surfaces throw on others is cut"),
             is_polished,
             "{said}"
         );
         assert_eq!(said.contains("--clamp 0 shows all of it"), is_polished, "{said}");
-        assert!(!desk.expect(&format!("a.glb {SMALL} -o a.exr --clamp 0"), 0).contains("cut"));
+        assert!(!dir.expect(&format!("a.glb {SMALL} -o a.exr --clamp 0"), 0).contains("cut"));
     }
-    desk.write("box.obj", box_of([1, 1, 1]));
-    assert!(!desk.expect(&format!("box.obj {SMALL} -o a.exr"), 0).contains("clamp"));
+    dir.write("box.obj", box_of([1, 1, 1]));
+    assert!(!dir.expect(&format!("box.obj {SMALL} -o a.exr"), 0).contains("clamp"));
 }
 
 /// A part of a scene's own, and a whole file with its materials.
 #[test]
 fn a_scene_may_name_a_gltf_file_or_a_part_of_it() {
-    let desk = Desk::new();
-    desk.write("cubes.glb", cubes(&checker()));
+    let dir = TestDir::new();
+    dir.write("cubes.glb", cubes(&checker()));
     let check = |text: &str, code: i32| {
-        desk.write(
+        dir.write(
             "scene.toml",
             format!("[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[environment]\ncolor = 1\n{text}"),
         );
-        let output = desk.run("check scene.toml");
+        let output = dir.run("check scene.toml");
         assert_eq!(output.status.code(), Some(code), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8([output.stdout, output.stderr].concat()).expect("UTF-8")
     };
@@ -449,7 +449,7 @@ fn a_scene_may_name_a_gltf_file_or_a_part_of_it() {
 
 #[test]
 fn a_broken_model_is_an_error_with_its_place() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (file, content, words) in [
         ("a.glb", &b"glTF\x02\0\0\0\0\0\0\0"[..], "it has no JSON"),
         ("a.gltf", b"{", "line 1: column 1"),
@@ -457,15 +457,15 @@ fn a_broken_model_is_an_error_with_its_place() {
         ("a.stl", b"solid a\nvertex", "line 2"),
         ("a.ply", b"ply\n", "a.ply"),
     ] {
-        desk.write(file, content);
-        let said = desk.expect(&format!("{file} {SMALL}"), 2);
+        dir.write(file, content);
+        let said = dir.expect(&format!("{file} {SMALL}"), 2);
         assert!(said.contains(words) && said.contains(file), "{file}: {said}");
     }
 }
 
 #[test]
 fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let moved = |size: f64, to: f64| {
         let corner = |bits: i32| {
             let at = |axis: i32, length: f64| to + size * length * f64::from(bits >> axis & 1);
@@ -474,11 +474,11 @@ fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
         let corners: String = (0..8).map(corner).collect();
         corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
     };
-    desk.write("near.obj", moved(1.0, 0.0));
-    let near = picture(&desk, "near.obj --view normal");
+    dir.write("near.obj", moved(1.0, 0.0));
+    let near = picture(&dir, "near.obj --view normal");
     for (size, to) in [(1e-6, 1.0), (1e-6, 10.0), (1e-5, 100.0), (1e-7, 10.0), (1e7, 1e15), (1e9, 1e17)] {
-        desk.write("far.obj", moved(size, to));
-        let far = picture(&desk, "far.obj --view normal");
+        dir.write("far.obj", moved(size, to));
+        let far = picture(&dir, "far.obj --view normal");
         let squares: f32 = near.iter().zip(&far).map(|(a, b)| (a - b) * (a - b)).sum();
         let off = (squares / near.len() as f32).sqrt();
         assert!(off < 0.05, "{size} at {to}: {off}");
@@ -487,71 +487,71 @@ fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
 
 #[test]
 fn what_an_import_would_copy_damaged_is_refused_with_the_name_of_the_image() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let mut damaged = checker();
     let place = damaged.len() - 20;
     damaged[place] ^= 255;
-    desk.write("a.glb", cubes(&damaged));
+    dir.write("a.glb", cubes(&damaged));
     for call in ["check a.glb", "import a.glb"] {
-        let said = desk.expect(call, 2);
+        let said = dir.expect(call, 2);
         assert!(said.contains("it claims"), "{call}: {said}");
     }
-    let said = desk.expect("import a.glb", 2);
+    let said = dir.expect("import a.glb", 2);
     assert!(said.contains("a.glb: images[0]: it claims"), "{said}");
 }
 
 #[test]
 fn models_that_cannot_be_shown_are_named_by_what_is_wrong() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for ending in ["obj", "off"] {
         let text = match ending {
             "obj" => "v 1e20 0 0\nv 1 0 0\nv 0 1e20 0\nf 1 2 3\n",
             _ => "OFF\n3 1 0\n1e20 0 0\n1 0 0\n0 1e20 0\n3 0 1 2\n",
         };
-        desk.write(&format!("far.{ending}"), text);
-        let said = desk.expect(&format!("check far.{ending}"), 2);
+        dir.write(&format!("far.{ending}"), text);
+        let said = dir.expect(&format!("check far.{ending}"), 2);
         let reach = said.split_once("its coordinates reach to ").map(|(_, rest)| rest);
         let reach = reach.and_then(|rest| rest.split(',').next()?.parse::<f64>().ok());
         assert!(reach.is_some_and(|reach| (reach / 1e20 - 1.0).abs() < 1e-6), "{said}");
         assert!(said.contains("must stay below 1e18") && !said.contains("position"), "{said}");
     }
-    desk.write("a.fbx", "Kaydara FBX Binary");
-    let said = desk.expect("check a.fbx", 2);
+    dir.write("a.fbx", "Kaydara FBX Binary");
+    let said = dir.expect("check a.fbx", 2);
     assert!(said.contains("a format that glimt does not read: .fbx"), "{said}");
     assert!(said.contains(".obj") && said.contains(".glb") && said.contains(".gltf"), "{said}");
-    let said = desk.expect("check none.stl", 2);
+    let said = dir.expect("check none.stl", 2);
     assert!(!said.contains("glimt new"), "{said}");
-    fs::create_dir(desk.path("folder.ply")).expect("a folder");
-    let said = desk.expect("check folder.ply", 2);
+    fs::create_dir(dir.path("folder.ply")).expect("a folder");
+    let said = dir.expect("check folder.ply", 2);
     assert!(said.contains("this is a folder, not a model") && !said.contains("scene.toml"), "{said}");
 }
 
 #[test]
 fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl q\nf 1 2 3\n";
-    desk.write("a.obj", format!("mtllib a.mtl\n{triangle}"));
+    dir.write("a.obj", format!("mtllib a.mtl\n{triangle}"));
     // A material file that was not copied along.
     for call in [format!("a.obj {SMALL} -o a.png"), "check a.obj".to_owned()] {
-        let said = String::from_utf8(desk.run(&call).stderr).expect("UTF-8");
+        let said = String::from_utf8(dir.run(&call).stderr).expect("UTF-8");
         assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
     }
-    desk.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
-    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 0);
+    dir.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
+    let said = dir.expect(&format!("a.obj {SMALL} -o a.png"), 0);
     assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
-    let said = desk.expect("check a.obj", 2);
+    let said = dir.expect("check a.obj", 2);
     assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
-    desk.write("nope.png", checker());
-    let said = desk.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
+    dir.write("nope.png", checker());
+    let said = dir.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
     assert!(said.contains("cannot write nope.png") && !said.contains("a.obj:"), "{said}");
 }
 
 /// The picture is that of the ground alone, which says nothing of what is wrong.
 #[test]
 fn a_model_of_which_nothing_is_seen_says_so() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let said = |file: &str| {
-        let said = desk.expect(&format!("{file} {SMALL} -o a.exr"), 0);
+        let said = dir.expect(&format!("{file} {SMALL} -o a.exr"), 0);
         (said.matches("nothing of it is seen: its faces have an opacity of 0").count(), said)
     };
     let mut unseen = Vec::new();
@@ -567,7 +567,7 @@ fn a_model_of_which_nothing_is_seen_says_so() {
         let mut cube = cube(&mut glb);
         cube["material"] = json!(0);
         let is_beyond = material["alphaCutoff"] == 2;
-        desk.write(
+        dir.write(
             "a.glb",
             glb.finish(json!({
                 "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [material]
@@ -581,25 +581,25 @@ fn a_model_of_which_nothing_is_seen_says_so() {
             "{said}"
         );
         if !is_seen {
-            unseen.push(desk.bytes("a.exr"));
+            unseen.push(dir.bytes("a.exr"));
         }
         if !is_beyond {
-            desk.expect("import a.glb --strict", 0);
-            fs::remove_file(desk.path("a.toml")).expect("removed");
-            fs::remove_dir_all(desk.path("a_files")).expect("removed");
+            dir.expect("import a.glb --strict", 0);
+            fs::remove_file(dir.path("a.toml")).expect("removed");
+            fs::remove_dir_all(dir.path("a_files")).expect("removed");
         }
     }
     assert!(unseen.iter().all(|picture| *picture == unseen[0]), "the ground alone");
     // One face that is seen is enough.
     let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl p\nf 1 2 3\nusemtl q\nf 1 3 2\n";
-    desk.write("a.obj", faces);
+    dir.write("a.obj", faces);
     for (mtl, count) in [
         ("newmtl p\nd 0\nnewmtl q\nd 0\n", 1),
         ("newmtl p\nd 0\nnewmtl q\nd 0.5\n", 0),
         ("newmtl p\nd 0\n", 0),
         ("newmtl p\nd 0\nnewmtl q\nd 0\nillum 7\n", 0),
     ] {
-        desk.write("a.mtl", mtl);
+        dir.write("a.mtl", mtl);
         let (found, said) = said("a.obj");
         assert_eq!(found, count, "{mtl}: {said}");
     }
@@ -608,9 +608,9 @@ fn a_model_of_which_nothing_is_seen_says_so() {
 /// A model whose picture was not copied along is shown without it.
 #[test]
 fn a_model_is_shown_without_pictures_that_cannot_be_read() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl q\nf 1/1 2/2 3/3\n";
-    desk.write("a.obj", faces);
+    dir.write("a.obj", faces);
     let maps = "map_Kd kd.png\nmap_Ks ks.png\nmap_Ke ke.png\nmap_d d.png\nnorm n.png\n";
     let names = ["kd.png", "ks.png", "ke.png", "d.png", "n.png"];
     let physical = "map_Pr pr.png\nmap_Pm pm.png\nmap_Kd kd.png\n";
@@ -619,33 +619,33 @@ fn a_model_is_shown_without_pictures_that_cannot_be_read() {
         ("Kd 0.8 0.2 0.1\nPr 0.2\nPm 0.5\n", physical, &["kd.png", "pr.png", "pm.png"]),
     ] {
         // A map that shines is not replaced by light all over.
-        desk.write("a.mtl", format!("newmtl q\n{}", plain.replace("Ke 0.1 0 0\n", "")));
-        let expected = picture(&desk, "a.obj");
-        desk.write("a.mtl", format!("newmtl q\n{plain}{maps}"));
+        dir.write("a.mtl", format!("newmtl q\n{}", plain.replace("Ke 0.1 0 0\n", "")));
+        let expected = picture(&dir, "a.obj");
+        dir.write("a.mtl", format!("newmtl q\n{plain}{maps}"));
         for content in [None, Some("no picture")] {
             for name in names {
                 match content {
-                    None => drop(fs::remove_file(desk.path(name))),
-                    Some(content) => desk.write(name, content),
+                    None => drop(fs::remove_file(dir.path(name))),
+                    Some(content) => dir.write(name, content),
                 }
             }
-            let said = desk.expect(&format!("a.obj {SMALL} -o a.exr"), 0);
+            let said = dir.expect(&format!("a.obj {SMALL} -o a.exr"), 0);
             for name in names {
                 assert!(said.contains(name), "{name}: {said}");
             }
             assert!(said.contains("the material \"q\" of a.obj is shown without it"), "{said}");
-            assert!(picture(&desk, "a.obj") == expected, "{maps}{content:?}");
+            assert!(picture(&dir, "a.obj") == expected, "{maps}{content:?}");
         }
         // It stays an input, and who asks for the model as a whole is refused.
-        let said = desk.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
+        let said = dir.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
         assert!(said.contains("cannot write kd.png"), "{said}");
-        assert_eq!(desk.bytes("kd.png"), b"no picture");
-        assert!(desk.expect("check a.obj", 2).contains("kd.png"));
+        assert_eq!(dir.bytes("kd.png"), b"no picture");
+        assert!(dir.expect("check a.obj", 2).contains("kd.png"));
     }
     // Of glTF too: images that are files, and images inside.
     let plain = |glb: Vec<u8>| {
-        desk.write("a.glb", glb);
-        picture(&desk, "a.glb")
+        dir.write("a.glb", glb);
+        picture(&dir, "a.glb")
     };
     let mut glb = Glb::default();
     let mut bare = cube(&mut glb);
@@ -654,44 +654,44 @@ fn a_model_is_shown_without_pictures_that_cannot_be_read() {
         "nodes": [{"mesh": 0, "name": "../cube"}], "meshes": [{"primitives": [bare]}], "materials": [{"pbrMetallicRoughness": {}}]
     })));
     assert!(plain(with_image("lost.png")) == bare);
-    let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+    let said = dir.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
     assert!(
         said.contains("lost.png") && said.contains("\"material\" of a.glb is shown without it"),
         "{said}"
     );
-    assert!(desk.expect("import a.glb", 2).contains("images[0]"));
-    assert!(desk.expect("check a.glb", 2).contains("lost.png"));
-    desk.write("lost.png", checker());
-    assert!(picture(&desk, "a.glb") != bare);
-    desk.write("lost.png", "no picture");
-    assert!(picture(&desk, "a.glb") == bare);
-    assert!(desk.expect(&format!("a.glb {SMALL} -o lost.png"), 2).contains("cannot write lost.png"));
+    assert!(dir.expect("import a.glb", 2).contains("images[0]"));
+    assert!(dir.expect("check a.glb", 2).contains("lost.png"));
+    dir.write("lost.png", checker());
+    assert!(picture(&dir, "a.glb") != bare);
+    dir.write("lost.png", "no picture");
+    assert!(picture(&dir, "a.glb") == bare);
+    assert!(dir.expect(&format!("a.glb {SMALL} -o lost.png"), 2).contains("cannot write lost.png"));
     let mut damaged = checker();
     damaged.truncate(60);
-    desk.write("a.glb", cubes(&damaged));
-    let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+    dir.write("a.glb", cubes(&damaged));
+    let said = dir.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
     assert!(said.contains("\"paint \"1\"\" of a.glb is shown without it"), "{said}");
 }
 
 #[test]
 fn a_picture_of_a_model_says_how_it_was_seen() {
-    let desk = Desk::new();
-    desk.write("a.obj", box_of([1, 2, 3]));
-    desk.expect(&format!("a.obj {SMALL} --from left --up z -o a.png"), 0);
-    let info = |name: &str| String::from_utf8(desk.run(&format!("info {name}")).stdout).expect("UTF-8");
+    let dir = TestDir::new();
+    dir.write("a.obj", box_of([1, 2, 3]));
+    dir.expect(&format!("a.obj {SMALL} --from left --up z -o a.png"), 0);
+    let info = |name: &str| String::from_utf8(dir.run(&format!("info {name}")).stdout).expect("UTF-8");
     let said = info("a.png");
     assert!(said.contains("  from        left\n") && said.contains("  up          z\n"), "{said}");
-    desk.expect(&format!("a.obj {SMALL} -o b.png"), 0);
+    dir.expect(&format!("a.obj {SMALL} -o b.png"), 0);
     let said = info("b.png");
     assert!(!said.contains("  from ") && !said.contains("  up "), "{said}");
 }
 
 #[test]
 fn a_model_that_would_be_replaced_is_called_a_model() {
-    let desk = Desk::new();
-    desk.write("a.obj", box_of([1, 2, 3]));
-    std::os::unix::fs::symlink("a.obj", desk.path("a.png")).expect("a link");
-    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    let dir = TestDir::new();
+    dir.write("a.obj", box_of([1, 2, 3]));
+    std::os::unix::fs::symlink("a.obj", dir.path("a.png")).expect("a link");
+    let said = dir.expect(&format!("a.obj {SMALL} -o a.png"), 2);
     assert!(said.contains("cannot write a.png: it is a.obj, the model"), "{said}");
     assert!(said.lines().all(|line| line.trim() != "|"), "{said}");
 }

@@ -7,13 +7,13 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 const SMALL: &str = "--once --width 32 --height 24 --samples 2 --error 0";
 
 /// Four balls of different colours around a point, one on each side.
-fn around() -> Desk {
-    let desk = Desk::new();
+fn around() -> TestDir {
+    let dir = TestDir::new();
     let ball = |name: &str, color: &str, center: &str| {
         format!(
             "[materials.{name}]\ntype = \"phong\"\ndiffuse = 0\nemission = {color}\n\
@@ -28,8 +28,8 @@ fn around() -> Desk {
     ];
     let camera = "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nfov = 20\n";
     let balls: String = balls.iter().map(|(name, color, center)| ball(name, color, center)).collect();
-    desk.write("around.toml", format!("{camera}{balls}"));
-    desk
+    dir.write("around.toml", format!("{camera}{balls}"));
+    dir
 }
 
 /// The pixel in the middle of a picture of 32 × 24.
@@ -38,8 +38,8 @@ fn middle(rgb: &[u8]) -> [u8; 3] {
     [rgb[at], rgb[at + 1], rgb[at + 2]]
 }
 
-fn picture(desk: &Desk, name: &str) -> Vec<u8> {
-    image::open(desk.path(name)).expect("a picture").to_rgb8().into_raw()
+fn picture(dir: &TestDir, name: &str) -> Vec<u8> {
+    image::open(dir.path(name)).expect("a picture").to_rgb8().into_raw()
 }
 
 /// The frames of an APNG.
@@ -56,39 +56,39 @@ fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 #[test]
 fn the_camera_goes_around_in_numbered_files_and_in_one_that_moves() {
-    let desk = around();
+    let dir = around();
     let stderr =
-        desk.expect(&format!("around.toml {SMALL} --turntable 4 -o a_####.png -o a.apng -o a.gif"), 0);
+        dir.expect(&format!("around.toml {SMALL} --turntable 4 -o a_####.png -o a.apng -o a.gif"), 0);
     let names = ["a_0001.png", "a_0002.png", "a_0003.png", "a_0004.png"];
     let colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]];
-    let moving = frames(&desk.bytes("a.apng"));
+    let moving = frames(&dir.bytes("a.apng"));
     assert_eq!(moving.len(), 4);
     for ((name, color), frame) in names.iter().zip(colors).zip(moving) {
-        let still = picture(&desk, name);
+        let still = picture(&dir, name);
         assert_eq!(middle(&still), color, "{name}");
         assert_eq!(still, frame, "{name}");
     }
-    assert!(desk.bytes("a.gif").starts_with(b"GIF89a"));
+    assert!(dir.bytes("a.gif").starts_with(b"GIF89a"));
     assert_eq!(stderr.matches("wrote a_0003.png").count(), 1, "{stderr}");
     assert!(stderr.contains("wrote a.gif (32×24, 4 frames)"), "{stderr}");
     // The first one is the picture of the call without it.
-    desk.expect(&format!("around.toml {SMALL} -o single.png"), 0);
-    assert_eq!(picture(&desk, "single.png"), picture(&desk, "a_0001.png"));
+    dir.expect(&format!("around.toml {SMALL} -o single.png"), 0);
+    assert_eq!(picture(&dir, "single.png"), picture(&dir, "a_0001.png"));
 }
 
 #[test]
 fn files_and_trees_and_photons_are_made_once() {
-    let desk = Desk::new();
-    desk.write("knot.obj", std::fs::read("assets/knot.obj").expect("a mesh"));
-    desk.write(
+    let dir = TestDir::new();
+    dir.write("knot.obj", std::fs::read("assets/knot.obj").expect("a mesh"));
+    dir.write(
         "pool.toml",
         "[camera]\nposition = [0, 2, 6]\nlook_at = [0, 0, 0]\n[photons]\nenabled = true\n[materials.m]\n\
          [materials.g]\ntype = \"glass\"\n[[mesh]]\nfile = \"knot.obj\"\nmaterial = \"m\"\n[[sphere]]\n\
          center = [0, 3, 0]\nradius = 0.5\nmaterial = \"g\"\n[[light]]\nposition = [0, 6, 0]\nintensity = 9\n",
     );
-    desk.expect(&format!("pool.toml {SMALL} --turntable 3 -o a#.ppm --report r#.json"), 0);
+    dir.expect(&format!("pool.toml {SMALL} --turntable 3 -o a#.ppm --report r#.json"), 0);
     for number in 2..=3 {
-        let text = std::fs::read_to_string(desk.path(&format!("r{number}.json"))).expect("a report");
+        let text = std::fs::read_to_string(dir.path(&format!("r{number}.json"))).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
         assert_eq!(report["image"]["path"], format!("a{number}.ppm"));
         let stages = report["stages"].as_array().expect("stages");
@@ -105,11 +105,11 @@ fn files_and_trees_and_photons_are_made_once() {
 
 #[test]
 fn a_model_stays_in_the_frame() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     // A long plank, seen from its end first.
-    desk.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nv -1 2 8\nv 0 3 0\nf 1 2 3 4\nf 1 2 5\nf 3 4 5\n");
-    desk.expect(&format!("plank.obj {SMALL} --turntable 4 --from front --view albedo -o b.apng"), 0);
-    for frame in frames(&desk.bytes("b.apng")) {
+    dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nv -1 2 8\nv 0 3 0\nf 1 2 3 4\nf 1 2 5\nf 3 4 5\n");
+    dir.expect(&format!("plank.obj {SMALL} --turntable 4 --from front --view albedo -o b.apng"), 0);
+    for frame in frames(&dir.bytes("b.apng")) {
         let row = |y: usize| frame[3 * 32 * y..3 * 32 * (y + 1)].to_vec();
         let pixel = |y: usize, x: usize| row(y)[3 * x..3 * x + 3].to_vec();
         // The ground's colour is at both edges of every row.
@@ -119,9 +119,9 @@ fn a_model_stays_in_the_frame() {
 
 #[test]
 fn what_a_turntable_cannot_be_is_refused_before_the_work() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let says = |line: &str, words: &str| {
-        let stderr = desk.expect(&format!("ball.toml {line}"), 2);
+        let stderr = dir.expect(&format!("ball.toml {line}"), 2);
         assert!(stderr.contains(words), "{line}: {stderr}");
     };
     says("--turntable 4 -o a.gif", "--turntable needs --once");
@@ -136,81 +136,81 @@ fn what_a_turntable_cannot_be_is_refused_before_the_work() {
     says("--once --turntable 4 -o a_#.png -o a_#.png", "given twice");
     says("--once --turntable 11 -o a_#.png -o a_1#.png", "a_11.png would hold two pictures");
     // A later picture would replace an input: nothing is rendered.
-    desk.write("a3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
-    let scene = format!("{}[textures.t]\nfile = \"a3.png\"\n", super::desk::SCENE);
-    desk.write("uses.toml", scene);
-    let stderr = desk.expect("uses.toml --once --turntable 4 -o a#.png", 2);
+    dir.write("a3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
+    let scene = format!("{}[textures.t]\nfile = \"a3.png\"\n", super::test_dir::SCENE);
+    dir.write("uses.toml", scene);
+    let stderr = dir.expect("uses.toml --once --turntable 4 -o a#.png", 2);
     assert!(stderr.contains("cannot write a3.png"), "{stderr}");
-    assert!(!desk.path("a1.png").exists());
-    let stderr = desk.expect("ball.toml --once --turntable 10000 -o a.gif --width 1000 --height 1000", 1);
+    assert!(!dir.path("a1.png").exists());
+    let stderr = dir.expect("ball.toml --once --turntable 10000 -o a.gif --width 1000 --height 1000", 1);
     assert!(stderr.contains("27.94 GiB of memory until it is written"), "{stderr}");
     let stderr =
-        desk.expect("ball.toml --once --turntable 10000 -o a.gif --width 64 --height 64 --memory 30MiB", 1);
+        dir.expect("ball.toml --once --turntable 10000 -o a.gif --width 64 --height 64 --memory 30MiB", 1);
     assert!(stderr.contains("the frames") && stderr.contains("render fewer or smaller frames"), "{stderr}");
 }
 
 #[test]
 fn pictures_that_are_one_file_by_a_link_are_found_before_the_work() {
-    let desk = around();
-    std::os::unix::fs::symlink("a_3.png", desk.path("a_1.png")).expect("a link");
-    desk.write("a_3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
-    let stderr = desk.expect(&format!("around.toml {SMALL} --turntable 4 -o a_#.png"), 2);
+    let dir = around();
+    std::os::unix::fs::symlink("a_3.png", dir.path("a_1.png")).expect("a link");
+    dir.write("a_3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
+    let stderr = dir.expect(&format!("around.toml {SMALL} --turntable 4 -o a_#.png"), 2);
     assert!(stderr.contains("the outputs a_1.png and a_3.png are one file"), "{stderr}");
-    assert!(!desk.path("a_2.png").exists());
+    assert!(!dir.path("a_2.png").exists());
 }
 
 /// Without a name they are those of the scene, and replace only what glimt wrote.
 #[test]
 fn default_names_replace_no_foreign_picture() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once --turntable 2", 0);
-    desk.expect("ball.toml --once --turntable 2 --seed 4", 0);
-    assert!(desk.path("ball_0002.png").exists() && !desk.path("ball.png").exists());
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once --turntable 2", 0);
+    dir.expect("ball.toml --once --turntable 2 --seed 4", 0);
+    assert!(dir.path("ball_0002.png").exists() && !dir.path("ball.png").exists());
     let foreign = std::fs::read("assets/textures/checker.png").expect("an image");
-    desk.write("ball_0002.png", &foreign);
-    let stderr = desk.expect("ball.toml --once --turntable 2 --seed 5", 2);
+    dir.write("ball_0002.png", &foreign);
+    let stderr = dir.expect("ball.toml --once --turntable 2 --seed 5", 2);
     assert!(stderr.contains("cannot write ball_0002.png"), "{stderr}");
-    assert_eq!(desk.bytes("ball_0002.png"), foreign);
+    assert_eq!(dir.bytes("ball_0002.png"), foreign);
     // A name in the scene is that of a single picture.
-    desk.write("named.toml", super::desk::SCENE.replace("samples = 2", "samples = 2\noutput = \"x.png\""));
-    desk.expect("named.toml --once --turntable 2", 0);
-    assert!(desk.path("x_0001.png").exists() && !desk.path("x.png").exists());
+    dir.write("named.toml", super::test_dir::SCENE.replace("samples = 2", "samples = 2\noutput = \"x.png\""));
+    dir.expect("named.toml --once --turntable 2", 0);
+    assert!(dir.path("x_0001.png").exists() && !dir.path("x.png").exists());
 }
 
 #[test]
 fn an_interrupted_turntable_leaves_whole_files_only() {
-    let desk = around();
+    let dir = around();
     let line = "around.toml --once --width 64 --height 48 --samples 1000 --error 0 --turntable 5000 -o a_#.png -o a.gif";
-    let mut process = desk.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
+    let mut process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
     let begin = std::time::Instant::now();
-    while !desk.path("a_2.png").exists() {
+    while !dir.path("a_2.png").exists() {
         assert!(begin.elapsed() < Duration::from_secs(60), "no second picture");
         std::thread::sleep(Duration::from_millis(10));
     }
     kill(Pid::from_raw(process.id() as i32), Signal::SIGTERM).expect("it runs");
     assert_eq!(process.wait().expect("it ends").code(), Some(143));
-    let names: Vec<String> = std::fs::read_dir(desk.path("."))
+    let names: Vec<String> = std::fs::read_dir(dir.path("."))
         .expect("a folder")
         .map(|entry| entry.expect("a file").file_name().into_string().expect("UTF-8"))
         .collect();
     let pictures: Vec<&String> = names.iter().filter(|name| name.ends_with(".png")).collect();
     assert_eq!(pictures.len() + 2, names.len(), "nothing else is there: {names:?}");
-    pictures.iter().for_each(|name| assert_eq!(picture(&desk, name).len(), 64 * 48 * 3));
+    pictures.iter().for_each(|name| assert_eq!(picture(&dir, name).len(), 64 * 48 * 3));
 }
 
 #[test]
 fn a_scene_that_changes_on_the_way_ends_its_turntable() {
-    let desk = around();
+    let dir = around();
     let line =
         "around.toml --once --width 64 --height 48 --samples 200 --error 0 --turntable 5000 -o a_#.png";
-    let process = desk.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
+    let process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
     let begin = std::time::Instant::now();
-    while !desk.path("a_1.png").exists() {
+    while !dir.path("a_1.png").exists() {
         assert!(begin.elapsed() < Duration::from_secs(60), "no picture");
         std::thread::sleep(Duration::from_millis(10));
     }
-    let text = std::fs::read_to_string(desk.path("around.toml")).expect("a scene");
-    desk.write("around.toml", text.replace("radius = 0.8", "radius = 0.7"));
+    let text = std::fs::read_to_string(dir.path("around.toml")).expect("a scene");
+    dir.write("around.toml", text.replace("radius = 0.8", "radius = 0.7"));
     let output = process.wait_with_output().expect("it ends");
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(1), "{stderr}");
@@ -219,24 +219,24 @@ fn a_scene_that_changes_on_the_way_ends_its_turntable() {
 
 #[test]
 fn pictures_of_a_longer_turntable_before_are_named_and_stay() {
-    let desk = around();
-    assert!(!desk.expect(&format!("around.toml {SMALL} --turntable 4 -o w_##.png"), 0).contains("longer"));
-    let third = desk.bytes("w_03.png");
-    let said = desk.expect(&format!("around.toml {SMALL} --turntable 2 -o w_##.png"), 0);
+    let dir = around();
+    assert!(!dir.expect(&format!("around.toml {SMALL} --turntable 4 -o w_##.png"), 0).contains("longer"));
+    let third = dir.bytes("w_03.png");
+    let said = dir.expect(&format!("around.toml {SMALL} --turntable 2 -o w_##.png"), 0);
     assert!(said.contains("w_03.png and 1 more: of a longer turntable before"), "{said}");
-    assert_eq!(desk.bytes("w_03.png"), third);
+    assert_eq!(dir.bytes("w_03.png"), third);
 }
 
 /// `output` in `[render]` names no pictures of a turntable, and a model has none.
 #[test]
 fn the_way_out_of_a_foreign_picture_is_one_that_the_call_takes() {
-    let desk = Desk::new();
-    desk.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nf 1 2 3\n");
+    let dir = TestDir::new();
+    dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nf 1 2 3\n");
     let foreign = std::fs::read("assets/textures/checker.png").expect("an image");
     for name in ["plank.png", "plank_0001.png", "ball_0002.png", "ball.png"] {
-        desk.write(name, &foreign);
+        dir.write(name, &foreign);
     }
-    let said = |line: &str| desk.expect(line, 2);
+    let said = |line: &str| dir.expect(line, 2);
     for (file, name) in [("plank.obj", "plank_####.png"), ("ball.toml", "ball_####.png")] {
         let said = said(&format!("{file} {SMALL} --turntable 3"));
         assert!(said.contains(&format!("-o '{name}' or --force replaces it")), "{said}");
@@ -248,5 +248,5 @@ fn the_way_out_of_a_foreign_picture_is_one_that_the_call_takes() {
         "{single}"
     );
     assert!(said(&format!("ball.toml {SMALL}")).contains("in [render]"));
-    desk.expect(&format!("plank.obj {SMALL} --turntable 3 -o plank_####.png"), 0);
+    dir.expect(&format!("plank.obj {SMALL} --turntable 3 -o plank_####.png"), 0);
 }

@@ -1,16 +1,16 @@
 //! Contents of the views.
 
-use super::desk::Desk;
+use super::test_dir::TestDir;
 
 /// Red, green and blue of each pixel of a float picture.
-fn floats(desk: &Desk, name: &str) -> Vec<[f32; 3]> {
-    let picture = image::open(desk.path(name)).expect("a float picture").into_rgb32f();
+fn floats(dir: &TestDir, name: &str) -> Vec<[f32; 3]> {
+    let picture = image::open(dir.path(name)).expect("a float picture").into_rgb32f();
     picture.pixels().map(|pixel| pixel.0).collect()
 }
 
 #[test]
 fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     // But for a million triangles, whose mesh is generated first.
     for scene in [
         "cornell",
@@ -32,11 +32,11 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
     ] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
         let view = |view: &str| {
-            desk.expect(
+            dir.expect(
                 &format!("{path} --once --width 36 --height 27 --samples 2 --view {view} -o {view}.exr"),
                 0,
             );
-            floats(&desk, &format!("{view}.exr"))
+            floats(&dir, &format!("{view}.exr"))
         };
         let beauty = view("beauty");
         let parts = ["ambient", "diffuse", "specular", "emission"].map(view);
@@ -56,16 +56,16 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
 
 #[test]
 fn depth_is_a_distance_in_float_files_and_stretched_in_others() {
-    let desk = Desk::new();
-    desk.expect("ball.toml --once --samples 16 --view depth -o depth.exr -o depth.png", 0);
-    let depths: Vec<f32> = floats(&desk, "depth.exr").iter().map(|pixel| pixel[0]).collect();
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once --samples 16 --view depth -o depth.exr -o depth.png", 0);
+    let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     // The ball's front is 3.5 before the camera, its rim a little nearer than its middle at 4; behind it there is
     // nothing.
     let middle = depths[12 * 32 + 16];
     assert!((middle - 3.505).abs() < 0.006, "{middle}");
     assert_eq!(depths[0], 0.0);
     assert!(depths.iter().all(|&depth| depth < 4.0));
-    let shown = image::open(desk.path("depth.png")).expect("a picture").into_rgb8();
+    let shown = image::open(dir.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| shown.get_pixel(x, y).0[0];
     let brightest = shown.pixels().map(|pixel| pixel.0[0]).max();
     assert_eq!((brightest, at(0, 0)), (Some(255), 0), "near is bright, nothing is black");
@@ -73,8 +73,8 @@ fn depth_is_a_distance_in_float_files_and_stretched_in_others() {
 }
 
 /// Text chunks of a PNG.
-fn notes(desk: &Desk, name: &str) -> Vec<(String, String)> {
-    let file = std::io::BufReader::new(std::fs::File::open(desk.path(name)).expect("a file"));
+fn notes(dir: &TestDir, name: &str) -> Vec<(String, String)> {
+    let file = std::io::BufReader::new(std::fs::File::open(dir.path(name)).expect("a file"));
     let reader = png::Decoder::new(file).read_info().expect("a PNG");
     let texts =
         reader.info().uncompressed_latin1_text.iter().map(|text| (text.keyword.clone(), text.text.clone()));
@@ -87,36 +87,36 @@ fn notes(desk: &Desk, name: &str) -> Vec<(String, String)> {
 
 #[test]
 fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     let floor = "[[plane]]\nnormal = [0, 1, 0]\npoint = [0, 0.4, 0]\nmaterial = \"ball\"\n";
-    desk.write("floor.toml", format!("{}{floor}", super::desk::SCENE));
-    let report = desk.report("floor.toml --view depth -o depth.png -o depth.exr");
+    dir.write("floor.toml", format!("{}{floor}", super::test_dir::SCENE));
+    let report = dir.report("floor.toml --view depth -o depth.png -o depth.exr");
     let range = report["image"]["range"].as_array().expect("near and far").clone();
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
-    let depths: Vec<f32> = floats(&desk, "depth.exr").iter().map(|pixel| pixel[0]).collect();
+    let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     assert!(near < 2.0 && far > 10.0, "{near} {far}");
     // Pixels at the border of empty space do not count, as there are farther ones.
     let end = far as f32;
     assert!(depths.iter().any(|&depth| depth > end) && depths.contains(&end));
-    assert!(notes(&desk, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
+    assert!(notes(&dir, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
     // The ball at 3.5 and the floor beside it at 5.7: straight they would be 37 shades apart.
-    let shown = image::open(desk.path("depth.png")).expect("a picture").into_rgb8();
+    let shown = image::open(dir.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| i32::from(shown.get_pixel(x, y).0[0]);
     assert!(at(16, 13) - at(2, 15) > 42, "{} {}", at(16, 13), at(2, 15));
-    let beauty = desk.report("floor.toml -o beauty.png");
+    let beauty = dir.report("floor.toml -o beauty.png");
     assert!(beauty["image"]["range"].is_null());
 }
 
 #[test]
 fn samples_and_errors_are_told_of_each_pixel() {
-    let desk = Desk::new();
-    let report = desk.report("ball.toml --samples 5 --view samples -o samples.exr -o samples.png");
+    let dir = TestDir::new();
+    let report = dir.report("ball.toml --samples 5 --view samples -o samples.exr -o samples.png");
     assert_eq!(report["image"]["range"], serde_json::json!([0.0, 5.0]));
-    assert!(floats(&desk, "samples.exr").iter().all(|pixel| *pixel == [5.0; 3]));
-    let white = image::open(desk.path("samples.png")).expect("a picture").into_rgb8();
+    assert!(floats(&dir, "samples.exr").iter().all(|pixel| *pixel == [5.0; 3]));
+    let white = image::open(dir.path("samples.png")).expect("a picture").into_rgb8();
     assert!(white.pixels().all(|pixel| pixel.0 == [255; 3]));
-    desk.expect("ball.toml --once --samples 16 --view error -o error.exr", 0);
-    let errors = floats(&desk, "error.exr");
+    dir.expect("ball.toml --once --samples 16 --view error -o error.exr", 0);
+    let errors = floats(&dir, "error.exr");
     assert_eq!(errors[0], [0.0; 3], "where all samples are alike nothing is in doubt");
     assert!(errors.iter().any(|pixel| pixel[0] > 1e-3), "the border of the ball is");
     assert!(errors.iter().all(|pixel| pixel[0].is_finite() && pixel[0] < 0.5));

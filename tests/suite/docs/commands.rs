@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 
 use super::{Block, Page, pages, root};
-use crate::desk::PROGRAM;
+use crate::test_dir::PROGRAM;
 
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];

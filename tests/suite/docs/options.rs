@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use super::{codes, page, pages};
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 
 fn help(command: &str) -> String {
-    let output = Desk::new().run(&format!("{command} --help"));
+    let output = TestDir::new().run(&format!("{command} --help"));
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 

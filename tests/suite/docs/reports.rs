@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 use serde_json::Value;
 
 use super::{codes, page};
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 
 /// A glass ball, so that photons have somewhere to go.
-fn desk() -> Desk {
-    let desk = Desk::new();
-    let scene = crate::desk::SCENE.replace("type = \"phong\"\ndiffuse = [0.8, 0.2, 0.1]", "type = \"glass\"");
+fn dir() -> TestDir {
+    let dir = TestDir::new();
+    let scene = crate::test_dir::SCENE.replace("type = \"phong\"\ndiffuse = [0.8, 0.2, 0.1]", "type = \"glass\"");
     let floor =
         "[materials.floor]\n[[plane]]\nmaterial = \"floor\"\n[photons]\nenabled = true\ncount = 1000\n";
-    desk.write("glass.toml", format!("{scene}{floor}"));
-    desk
+    dir.write("glass.toml", format!("{scene}{floor}"));
+    dir
 }
 
 /// The paths of all values, with dots; those of the tables between, apart.
@@ -40,7 +40,7 @@ fn paths(value: &Value, path: &str, ends: &mut BTreeSet<String>, tables: &mut BT
 #[test]
 fn the_page_has_every_key_of_the_report() {
     let (mut ends, mut tables) = (BTreeSet::new(), BTreeSet::new());
-    paths(&desk().report("glass.toml"), "", &mut ends, &mut tables);
+    paths(&dir().report("glass.toml"), "", &mut ends, &mut tables);
     let rows = page("docs/report.md").rows("The report");
     let documented: BTreeSet<String> = rows.iter().flat_map(|row| codes(&row[0])).collect();
     let missing: Vec<_> = ends.difference(&documented).collect();
@@ -53,11 +53,11 @@ fn the_page_has_every_key_of_the_report() {
 #[test]
 fn the_page_has_every_key_of_progress() {
     let rows = page("docs/report.md").rows("Progress as JSON");
-    let desk = desk();
-    desk.write("broken.toml", "[render]\nheigth = 1\n");
+    let dir = dir();
+    dir.write("broken.toml", "[render]\nheigth = 1\n");
     let mut events = BTreeSet::new();
     for scene in ["glass.toml", "broken.toml"] {
-        let output = desk.run(&format!("{scene} --once --progress json"));
+        let output = dir.run(&format!("{scene} --once --progress json"));
         for line in String::from_utf8(output.stderr).expect("UTF-8").lines() {
             let event: Value = serde_json::from_str(line).expect("JSON");
             let name = event["event"].as_str().expect("a name").to_owned();

@@ -12,7 +12,7 @@ use glimt::scene::starter;
 use serde_json::Value;
 
 use self::validator::faults;
-use crate::desk::Desk;
+use crate::test_dir::TestDir;
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -161,22 +161,22 @@ fn nothing_is_a_mistake_that_the_program_takes() {
 
 #[test]
 fn a_new_scene_may_have_its_schema_beside_it() {
-    let desk = Desk::new();
-    desk.expect("new --schema first.toml", 0);
-    let scene = String::from_utf8(desk.bytes("first.toml")).expect("UTF-8");
+    let dir = TestDir::new();
+    dir.expect("new --schema first.toml", 0);
+    let scene = String::from_utf8(dir.bytes("first.toml")).expect("UTF-8");
     assert_eq!(scene, format!("{LINE}{}", starter()));
-    assert_eq!(String::from_utf8(desk.bytes(FILE)).expect("UTF-8"), text(Draft::Four));
-    assert!(desk.run("check first.toml").status.success());
+    assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), text(Draft::Four));
+    assert!(dir.run("check first.toml").status.success());
     // The same schema will do for another scene; another file of that name stays.
-    desk.expect("new --schema second.toml", 0);
-    desk.write(FILE, "mine");
+    dir.expect("new --schema second.toml", 0);
+    dir.write(FILE, "mine");
     assert!(
-        desk.expect("new --schema third.toml", 2)
+        dir.expect("new --schema third.toml", 2)
             .contains("glimt.schema.json is not the schema of this glimt, and is left")
     );
-    assert!(!desk.path("third.toml").exists() && desk.bytes(FILE) == b"mine");
+    assert!(!dir.path("third.toml").exists() && dir.bytes(FILE) == b"mine");
     // A scene that is there already gets none.
-    let other = Desk::new();
+    let other = TestDir::new();
     other.write("there.toml", "mine");
     assert!(other.expect("new --schema there.toml", 2).contains("exists already"));
     assert!(!other.path(FILE).exists() && other.bytes("there.toml") == b"mine");
@@ -184,12 +184,12 @@ fn a_new_scene_may_have_its_schema_beside_it() {
 
 #[test]
 fn both_drafts_are_printed() {
-    let desk = Desk::new();
+    let dir = TestDir::new();
     for (line, draft, uri) in [
         ("schema", Draft::Four, "http://json-schema.org/draft-04/schema#"),
         ("schema --draft 2020-12", Draft::Latest, "https://json-schema.org/draft/2020-12/schema"),
     ] {
-        let output = desk.run(line);
+        let output = dir.run(line);
         let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!(printed, schema(draft));
         assert_eq!(printed["$schema"], uri);

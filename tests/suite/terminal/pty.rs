@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::relay::{Answers, Relay, Seen};
-use crate::desk::PROGRAM;
+use crate::test_dir::PROGRAM;
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;

@@ -8,7 +8,7 @@ use std::time::Duration;
 use nix::sys::signal::Signal;
 
 use super::pty::{Folder, SCENE, Terminal};
-use crate::desk::PROGRAM;
+use crate::test_dir::PROGRAM;
 
 /// Sequences of the daily test.
 const SEQUENCES: u64 = 12;

@@ -33,13 +33,13 @@ intensity = [10, 10, 10]
 "#;
 
 /// A folder with a scene, in which the program is called.
-pub(crate) struct Desk(pub(crate) tempfile::TempDir);
+pub(crate) struct TestDir(pub(crate) tempfile::TempDir);
 
-impl Desk {
+impl TestDir {
     pub(crate) fn new() -> Self {
-        let desk = Self(tempfile::tempdir().expect("a scratch folder"));
-        desk.write("ball.toml", SCENE);
-        desk
+        let dir = Self(tempfile::tempdir().expect("a scratch folder"));
+        dir.write("ball.toml", SCENE);
+        dir
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

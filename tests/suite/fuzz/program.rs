@@ -3,17 +3,17 @@
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
 
-use super::worker::{AT_MOST, Desk, TRIES, harmful};
+use super::worker::{AT_MOST, CaseDir, TRIES, harmful};
 use super::{Case, Kind, Material};
-use crate::desk::PROGRAM;
+use crate::test_dir::PROGRAM;
 
 /// The cases of a kind that failed, with the reason.
 pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
-    let desk = Desk::new();
+    let dir = CaseDir::new();
     let material = Material::new();
     let cases = (0..count).map(|number| Case { kind, seed, number });
     let check = |case: Case| {
-        let scene = desk.lay(case, &material.make(case));
+        let scene = dir.lay(case, &material.make(case));
         let run = || run(Command::new(PROGRAM).arg("check").arg(&scene));
         let Some(output) = (0..TRIES).find_map(|_| run()) else {
             return Some((case, "it takes more than 2 s".to_owned()));

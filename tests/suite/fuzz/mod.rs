@@ -4,11 +4,11 @@
 //! The short version runs with the suite. The long one takes about ten minutes on two cores:
 //!
 //! ```text
-//! GLIMT_MUTATIONS=20000,5000,500 cargo test --profile quick --test suite mutation -- --nocapture
+//! GLIMT_FUZZ_CASES=20000,5000,500 cargo test --profile quick --test suite fuzz -- --nocapture
 //! ```
 //!
 //! The numbers are those of scenes and of assets that the library checks in worker processes, and of each kind that the program
-//! itself checks. `GLIMT_MUTATION_SEED` (a whole number, 1 by default) chooses other files. The same seed gives the same files;
+//! itself checks. `GLIMT_FUZZ_SEED` (a whole number, 1 by default) chooses other files. The same seed gives the same files;
 //! those that fail are kept in the folder that the message names.
 
 mod change;
@@ -72,14 +72,14 @@ impl Material {
 
 /// Numbers of scenes, of assets, and of each kind for the program itself.
 fn counts() -> [u64; 3] {
-    let asked = std::env::var("GLIMT_MUTATIONS").unwrap_or_else(|_| "250,250,15".to_owned());
+    let asked = std::env::var("GLIMT_FUZZ_CASES").unwrap_or_else(|_| "250,250,15".to_owned());
     let numbers: Vec<u64> =
         asked.split(',').map(|number| number.trim().parse().expect("three numbers")).collect();
-    numbers.try_into().expect("GLIMT_MUTATIONS is three numbers: scenes,assets,program")
+    numbers.try_into().expect("GLIMT_FUZZ_CASES is three numbers: scenes,assets,program")
 }
 
 fn seed() -> u64 {
-    std::env::var("GLIMT_MUTATION_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
+    std::env::var("GLIMT_FUZZ_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
 }
 
 /// Keeps the files of failed cases, and reports their folder.
@@ -87,7 +87,7 @@ fn settle(failures: &[(Case, String)]) {
     if failures.is_empty() {
         return;
     }
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("mutation");
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("fuzz");
     fs::create_dir_all(&folder).expect("a folder");
     let material = Material::new();
     let mut text = String::new();

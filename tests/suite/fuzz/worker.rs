@@ -36,7 +36,7 @@ const ADDRESS_BYTES: u64 = 16 << 30;
 const PACKET_SIZE: u64 = 2;
 
 /// Environment variable that makes a process of this test a worker, and names its cases.
-const ORDER: &str = "GLIMT_MUTATION_WORKER";
+const ORDER: &str = "GLIMT_FUZZ_WORKER";
 
 /// The cases of a kind that failed, with the reason.
 pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
@@ -73,7 +73,7 @@ const SLOW: &str = "it takes more than 2 s";
 fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     let Case { kind, seed, number } = first;
     let mut worker = Command::new(std::env::current_exe().expect("this program"))
-        .args(["mutation::worker::worker", "--exact", "--nocapture"])
+        .args(["fuzz::worker::worker", "--exact", "--nocapture"])
         .env(ORDER, format!("{kind:?} {seed} {number} {end}"))
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
@@ -136,12 +136,12 @@ fn worker() {
     let kind = if words[0] == "Scene" { Kind::Scene } else { Kind::Asset };
     let [seed, from, to] = [1, 2, 3].map(|word| words[word].parse().expect("a number"));
     setrlimit(Resource::RLIMIT_AS, ADDRESS_BYTES, ADDRESS_BYTES).expect("a limit");
-    let desk = Desk::new();
+    let dir = CaseDir::new();
     let material = Material::new();
-    listen_to_panics(&desk);
+    listen_to_panics(&dir);
     for number in from..to {
         let case = Case { kind, seed, number };
-        let scene = desk.lay(case, &material.make(case));
+        let scene = dir.lay(case, &material.make(case));
         say("begin");
         let said = one(&scene).map_or_else(|reason| reason.replace('\n', " "), |()| "right".to_owned());
         say(&said);
@@ -157,9 +157,9 @@ fn say(text: &str) {
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
 /// Installs a hook that hears all panics: the library silences panics that it contains, from its first work on.
-fn listen_to_panics(desk: &Desk) {
+fn listen_to_panics(dir: &CaseDir) {
     let _ = check(
-        &desk.lay(
+        &dir.lay(
             Case { kind: Kind::Asset, seed: 0, number: 0 },
             &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
         ),
@@ -212,9 +212,9 @@ pub(super) fn harmful(text: &str) -> Option<char> {
 const MTL: &str = "newmtl red\nKd 1 0 0\n";
 
 /// A folder with all that scenes may name.
-pub(super) struct Desk(tempfile::TempDir);
+pub(super) struct CaseDir(tempfile::TempDir);
 
-impl Desk {
+impl CaseDir {
     pub(super) fn new() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let scenes = folder.path().join("scenes");
