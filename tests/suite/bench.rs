@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::test_dir::TestDir;
 
-/// A ball on a floor under a lamp: few pixels, some indirect light.
+/// A ball on a floor under an area light: few pixels, some indirect light.
 const SCENE: &str = r#"[render]
 width = 24
 height = 16
@@ -34,13 +34,13 @@ material = "lamp"
 /// Options for a measurement small enough for a test.
 const SMALL: &str = "--samples 1,4 --reference-samples 64 --seeds 3 --progress none";
 
-fn dir() -> TestDir {
+fn box_dir() -> TestDir {
     let dir = TestDir::new();
     dir.write("box.toml", SCENE);
     dir
 }
 
-/// Runs `glimt bench` with a cache of its own; returns stdout and stderr.
+/// Runs `glimt bench` with its own cache; returns stdout and stderr.
 #[track_caller]
 fn bench(dir: &TestDir, line: &str, code: i32) -> (String, String) {
     let mut process = dir.glimt(&format!("bench {line}"));
@@ -55,7 +55,7 @@ fn json(dir: &TestDir, name: &str) -> Value {
     serde_json::from_slice(&dir.bytes(name)).expect("JSON")
 }
 
-/// The errors of all pictures.
+/// The relMSE of every image.
 fn errors(results: &Value) -> Vec<f64> {
     let methods = results["scenes"][0]["methods"].as_array().expect("methods");
     let steps = methods.iter().flat_map(|method| method["steps"].as_array().expect("steps"));
@@ -64,8 +64,8 @@ fn errors(results: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn a_scene_is_measured_from_end_to_end() {
-    let dir = dir();
+fn bench_measures_a_scene_end_to_end() {
+    let dir = box_dir();
     let (stdout, stderr) =
         bench(&dir, &format!("box.toml {SMALL} --csv a.csv --json a.json --plot a.svg"), 0);
     assert_eq!(stderr, "");
@@ -82,7 +82,7 @@ fn a_scene_is_measured_from_end_to_end() {
     }
     assert!(
         stdout.contains("whitted: set-up") && stdout.contains("\n  BIAS: "),
-        "ambient light in place of what bounces: {stdout}"
+        "ambient light replaces indirect light: {stdout}"
     );
     assert!(stdout.lines().all(|line| line.chars().count() <= 80 || line.contains("set-up")), "{stdout}");
     let results = json(&dir, "a.json");
@@ -101,8 +101,8 @@ fn a_scene_is_measured_from_end_to_end() {
 }
 
 #[test]
-fn the_same_seeds_have_the_same_errors_and_references_are_made_once() {
-    let dir = dir();
+fn errors_repeat_and_references_are_cached() {
+    let dir = box_dir();
     let line = format!("box.toml {SMALL} --integrator path --json");
     bench(&dir, &format!("{line} a.json"), 0);
     bench(&dir, &format!("{line} b.json --threads 1"), 0);
@@ -120,7 +120,7 @@ fn the_same_seeds_have_the_same_errors_and_references_are_made_once() {
         fs::write(&file, "broken").expect("written");
     }
     bench(&dir, &format!("{line} c.json"), 0);
-    assert!(!is_cached(&json(&dir, "c.json")), "a broken file is made again");
+    assert!(!is_cached(&json(&dir, "c.json")), "a damaged cache file is replaced");
     assert_eq!(errors(&json(&dir, "c.json")), errors(&a));
     dir.write("box.toml", SCENE.replace("0.6, 0.6, 0.5", "0.6, 0.6, 0.4"));
     bench(&dir, &format!("{line} d.json"), 0);
@@ -128,14 +128,13 @@ fn the_same_seeds_have_the_same_errors_and_references_are_made_once() {
     assert_eq!(kept().count(), 2);
     bench(&dir, &format!("{line} e.json --no-cache"), 0);
     assert!(
-        !is_cached(&json(&dir, "e.json"))
-            && errors(&json(&dir, "e.json")) == errors(&json(&dir, "d.json"))
+        !is_cached(&json(&dir, "e.json")) && errors(&json(&dir, "e.json")) == errors(&json(&dir, "d.json"))
     );
 }
 
 #[test]
-fn a_run_is_compared_with_an_older_one() {
-    let dir = dir();
+fn baseline_compares_with_an_older_run() {
+    let dir = box_dir();
     let line = format!("box.toml {SMALL} --integrator path");
     bench(&dir, &format!("{line} --json old.json"), 0);
     let (stdout, _) = bench(&dir, &format!("{line} --baseline old.json"), 0);
@@ -148,7 +147,7 @@ fn a_run_is_compared_with_an_older_one() {
         &format!("{line} --set render.max_depth=1 --set render.shadow_samples=64 --baseline old.json"),
         0,
     );
-    assert!(stdout.contains(": error × 0."), "less light is less noise: {stdout}");
+    assert!(stdout.contains(": error × 0."), "less light has less noise: {stdout}");
     dir.write("odd.json", "{}");
     let (_, stderr) = bench(&dir, &format!("{line} --baseline odd.json"), 2);
     assert!(
@@ -164,8 +163,8 @@ fn a_run_is_compared_with_an_older_one() {
 }
 
 #[test]
-fn a_baseline_that_is_no_file_is_not_read() {
-    let dir = dir();
+fn baseline_must_be_a_regular_file() {
+    let dir = box_dir();
     let pipe = dir.path("pipe.json");
     nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     for name in ["pipe.json", "/dev/zero"] {
@@ -178,13 +177,16 @@ fn a_baseline_that_is_no_file_is_not_read() {
 }
 
 #[test]
-fn all_scenes_are_looked_at_before_the_first_is_measured() {
-    let dir = dir();
+fn all_scenes_are_checked_before_measuring() {
+    let dir = box_dir();
     dir.write("broken.toml", SCENE.replace("radius = 0.5", "radius = -1"));
     let line = format!("box.toml none.toml broken.toml {SMALL} --csv a.csv");
     let (stdout, stderr) = bench(&dir, &line, 2);
     assert_eq!(stdout, "");
-    assert!(stderr.contains("none.toml") && stderr.contains("broken.toml:13"), "all that is wrong: {stderr}");
+    assert!(
+        stderr.contains("none.toml") && stderr.contains("broken.toml:13"),
+        "both errors are reported: {stderr}"
+    );
     assert!(!dir.path("a.csv").exists());
     assert!(!dir.path("cache/glimt/references").exists(), "nothing was measured");
     // This output is a file that the second scene reads.
@@ -206,8 +208,8 @@ fn all_scenes_are_looked_at_before_the_first_is_measured() {
 }
 
 #[test]
-fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
-    let dir = dir();
+fn references_set_the_size_and_one_warns() {
+    let dir = box_dir();
     for seed in [8, 9] {
         let line =
             format!("box.toml --once --integrator path --samples 64 --seed {seed} --width 12 --height 8");
@@ -236,8 +238,8 @@ fn given_references_decide_the_size_and_one_of_them_is_warned_of() {
 }
 
 #[test]
-fn no_output_is_an_input_or_another_output() {
-    let dir = dir();
+fn outputs_never_replace_inputs_or_each_other() {
+    let dir = box_dir();
     dir.write("skin.ppm", "P6\n1 1\n255\nabc");
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
     dir.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
@@ -263,7 +265,7 @@ fn no_output_is_an_input_or_another_output() {
         assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
     }
     assert_eq!(dir.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
-    // The file's name is missing: the next word is taken for it.
+    // If a file name is missing, the option takes the next word.
     for (line, words) in [
         (
             "--csv ball.toml",
@@ -283,8 +285,8 @@ fn no_output_is_an_input_or_another_output() {
 }
 
 #[test]
-fn a_file_that_cannot_be_written_does_not_cost_the_others() {
-    let dir = dir();
+fn one_write_failure_keeps_other_outputs() {
+    let dir = box_dir();
     symlink("/dev/full", dir.path("full.csv")).expect("a link");
     let line =
         "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
@@ -292,17 +294,17 @@ fn a_file_that_cannot_be_written_does_not_cost_the_others() {
     assert!(stderr.starts_with("error: cannot write full.csv: no space left on device"), "{stderr}");
     assert!(stderr.lines().count() == 1 && errors(&json(&dir, "a.json")).len() == 1, "{stderr}");
     assert!(dir.path("a.svg").is_file());
-    // Results replace results, whatever their names.
+    // Results replace earlier results, whatever their names.
     for _ in 0..2 {
         bench(&dir, &format!("{line} --json results --csv table"), 0);
     }
 }
 
 #[test]
-fn nothing_is_said_of_a_picture_that_is_not_written() {
-    let dir = dir();
+fn bench_ignores_the_scene_output() {
+    let dir = box_dir();
     let textured = SCENE.replace("diffuse = [0.6, 0.6, 0.5]", "diffuse = { texture = \"skin\" }");
-    // The picture that a render would write is the scene's texture, by its default name and by `output`.
+    // A render would write its image over the scene's texture, by default and with `output`.
     for (name, output) in [("skin.toml", ""), ("other.toml", "output = \"skin.png\"\n")] {
         let scene = textured.replace("[render]\n", &format!("[render]\n{output}"));
         dir.write(name, format!("{scene}\n[textures.skin]\nfile = \"skin.png\"\n"));
@@ -314,8 +316,8 @@ fn nothing_is_said_of_a_picture_that_is_not_written() {
 }
 
 #[test]
-fn wrong_calls_are_told_in_words() {
-    let dir = dir();
+fn bench_reports_wrong_calls() {
+    let dir = box_dir();
     dir.write("wrong.toml", SCENE.replace("radius = 0.5", "radius = -1"));
     let (_, stderr) = bench(&dir, "wrong.toml", 2);
     assert!(stderr.contains("wrong.toml:13:"), "{stderr}");
@@ -335,8 +337,8 @@ fn wrong_calls_are_told_in_words() {
 }
 
 #[test]
-fn progress_is_said_in_lines_or_objects() {
-    let dir = dir();
+fn progress_is_plain_lines_or_json_objects() {
+    let dir = box_dir();
     let line = "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache";
     let (stdout, plain) = bench(&dir, line, 0);
     assert!(
@@ -356,8 +358,8 @@ fn progress_is_said_in_lines_or_objects() {
 }
 
 #[test]
-fn budgets_of_time_are_points_too() {
-    let dir = dir();
+fn time_budgets_are_measured() {
+    let dir = box_dir();
     let line = "box.toml --time 0.02,0.01 --reference-samples 16 --seeds 2 --integrator path --progress none";
     bench(&dir, &format!("{line} --json a.json"), 0);
     let results = json(&dir, "a.json");
@@ -368,9 +370,9 @@ fn budgets_of_time_are_points_too() {
 }
 
 #[test]
-fn a_signal_ends_it_cleanly() {
+fn interrupted_bench_writes_nothing() {
     use std::process::Stdio;
-    let dir = dir();
+    let dir = box_dir();
     let mut process =
         dir.glimt("bench box.toml --reference-samples 4000000000 --no-cache --csv a.csv --progress json");
     let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");

@@ -1,10 +1,10 @@
-//! Bias of EXR files by `glimt compare`, over its standard error.
+//! The bias of EXR images and its standard error, from `glimt compare`.
 
 use serde_json::Value;
 
 use super::test_dir::TestDir;
 
-/// A box with a lamp, open to the camera: most of its walls' light has bounced.
+/// A box with an area light, open to the camera: most light on its walls is indirect.
 const SCENE: &str = r#"[render]
 width = 24
 height = 16
@@ -34,7 +34,7 @@ v = [0, 0, 1]
 material = "lamp"
 "#;
 
-fn dir() -> TestDir {
+fn box_dir() -> TestDir {
     let dir = TestDir::new();
     dir.write("box.toml", SCENE);
     dir
@@ -49,12 +49,12 @@ fn compared(dir: &TestDir, a: &str, b: &str) -> Value {
     serde_json::from_slice(&dir.run(&format!("compare --json {a} {b}")).stdout).expect("JSON")
 }
 
-/// Checks that the estimate is between 0.7 and 1.5 times the true error, and that the spread of 24 values is within a
-/// fifth of its own.
+/// Checks that the standard error is between 0.7 and 1.5 times the true one: 24 z-scores give their spread within a
+/// fifth.
 #[test]
-fn seeds_that_differ_have_a_z_of_chance() {
+fn different_seeds_have_no_significant_bias() {
     const PAIRS: u32 = 24;
-    let dir = dir();
+    let dir = box_dir();
     let z: Vec<f64> = (0..PAIRS)
         .map(|pair| {
             render(&dir, "a.exr", &format!("--seed {}", 2 * pair + 1));
@@ -67,8 +67,8 @@ fn seeds_that_differ_have_a_z_of_chance() {
 }
 
 #[test]
-fn light_that_is_missing_is_no_chance() {
-    let dir = dir();
+fn missing_light_is_a_significant_bias() {
+    let dir = box_dir();
     render(&dir, "path.exr", "--seed 1 --samples 1024");
     render(&dir, "whitted.exr", "--seed 2 --samples 1024 --integrator whitted");
     let told = compared(&dir, "whitted.exr", "path.exr");
@@ -80,8 +80,8 @@ fn light_that_is_missing_is_no_chance() {
 }
 
 #[test]
-fn what_has_no_noise_of_its_own_has_no_z() {
-    let dir = dir();
+fn images_without_an_error_have_no_z() {
+    let dir = box_dir();
     render(&dir, "path.exr", "--seed 1");
     for options in ["--samples 1", "--crop 0,0,12,16", "--view normal", "--view samples"] {
         render(&dir, "other.exr", &format!("--seed 2 {options}"));

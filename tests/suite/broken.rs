@@ -1,4 +1,4 @@
-//! Broken scene files: the messages and places of each, and that it gets no others.
+//! Broken scene files: the exact diagnostics of each, with their positions.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -475,7 +475,7 @@ fn said(diagnostic: &Diagnostic) -> (usize, usize, String) {
 }
 
 #[test]
-fn every_broken_scene_is_told_all_of_it_and_nothing_else() {
+fn broken_scenes_get_exactly_their_diagnostics() {
     for (name, expected) in BROKEN {
         let found: Vec<_> =
             diagnostics(&folder().join(name).with_extension("toml")).iter().map(said).collect();
@@ -486,7 +486,7 @@ fn every_broken_scene_is_told_all_of_it_and_nothing_else() {
 }
 
 #[test]
-fn every_file_of_the_folder_is_in_the_table() {
+fn every_broken_scene_is_in_the_table() {
     let files = fs::read_dir(folder()).expect("the folder").map(|entry| entry.expect("an entry").path());
     let mut names: Vec<String> = files
         .filter(|path| path.is_file())
@@ -499,7 +499,7 @@ fn every_file_of_the_folder_is_in_the_table() {
 }
 
 #[test]
-fn reports_name_each_place_show_its_line_and_are_safe_to_print() {
+fn reports_show_positions_and_escape_controls() {
     for (name, expected) in BROKEN {
         let path = folder().join(name).with_extension("toml");
         let text = fs::read_to_string(&path).expect("text");
@@ -519,7 +519,7 @@ fn reports_name_each_place_show_its_line_and_are_safe_to_print() {
     }
 }
 
-/// The one diagnostic of a file with these bytes.
+/// The only diagnostic of a file with these bytes.
 fn of_bytes(bytes: &[u8]) -> Diagnostic {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
@@ -530,7 +530,7 @@ fn of_bytes(bytes: &[u8]) -> Diagnostic {
 }
 
 #[test]
-fn what_is_no_text_is_refused_with_its_place() {
+fn files_that_are_not_text_are_rejected() {
     let latin = said(&of_bytes(b"[camera]\n# caf\xe9\n"));
     assert_eq!((latin.0, latin.1), (2, 6));
     assert!(latin.2.starts_with("line 2 is not UTF-8 text: byte 0xe9 at offset 14"), "{}", latin.2);
@@ -550,7 +550,7 @@ fn what_is_no_text_is_refused_with_its_place() {
 }
 
 #[test]
-fn nesting_of_any_depth_is_an_error_and_no_overflow() {
+fn deep_nesting_is_an_error_not_an_overflow() {
     for (open, close) in [("[", "]"), ("{a=", "}"), ("a.", "a=1")] {
         let text = format!("x = {}{close}\n", open.repeat(200_000));
         assert_eq!(said(&of_bytes(text.as_bytes())).0, 1);
@@ -560,7 +560,7 @@ fn nesting_of_any_depth_is_an_error_and_no_overflow() {
 }
 
 #[test]
-fn numbers_up_to_255_get_the_text_that_is_meant() {
+fn colors_up_to_255_get_a_hex_suggestion() {
     let scene = |kind: &str, key: &str| {
         format!(
             "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\n\
@@ -594,9 +594,9 @@ fn numbers_up_to_255_get_the_text_that_is_meant() {
     assert!(!said[0].place.as_ref().is_some_and(|place| place.label.contains("255")));
 }
 
-/// Each value of a key with its message, its column and its help.
+/// The message, column and help for each value of a key.
 #[test]
-fn lists_in_other_manners_get_the_list_that_is_meant() {
+fn lists_in_foreign_syntax_get_a_suggestion() {
     let open = "`[` opened here is not closed";
     let brackets = "a list stands in brackets: write [0, 3, 3]";
     let write = Some("write [0, 3, 3]");
@@ -631,7 +631,7 @@ fn lists_in_other_manners_get_the_list_that_is_meant() {
     }
 }
 
-/// All diagnostics of this text.
+/// All diagnostics of a text.
 fn diagnostics_of(text: &str) -> Vec<Diagnostic> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
@@ -640,7 +640,7 @@ fn diagnostics_of(text: &str) -> Vec<Diagnostic> {
 }
 
 #[test]
-fn an_open_bracket_is_said_before_all_that_follows_from_it() {
+fn unclosed_bracket_is_reported_first() {
     for rest in ["fov = 30\nup = [0, 1, 0]\n", "[render]\nwidth = 3\n", "", "[[sphere]]\nradius = 1\n"] {
         let said = diagnostics_of(&format!("[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0\n{rest}"));
         assert_eq!(said[0].message, "`[` opened here is not closed", "{rest:?}: {said:?}");

@@ -1,4 +1,4 @@
-//! Bytes of real pictures on a terminal: first pictures, and edits until they settle.
+//! Bytes sent to the terminal for real images: the first preview, and edits until they converge.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
@@ -13,16 +13,16 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Windows, and the previews that fit into them beside the words.
+/// Window sizes, and the size of the preview next to the side panel.
 const SIZES: [(Rect, PreviewSize); 3] = [
     (Rect { x: 0, y: 0, width: 80, height: 24 }, PreviewSize { width: 60, height: 40, around: None }),
     (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72, around: None }),
     (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112, around: None }),
 ];
-/// Columns and rows of the film. Larger ones have less noise in their previews.
+/// Columns and rows of the film. Larger images have less noise in their previews.
 const FILM: u32 = 320;
 
-/// Renders scenes one after the other.
+/// Renders one scene after another.
 struct Studio {
     handle: Handle,
     preview: PreviewSize,
@@ -36,8 +36,7 @@ impl Studio {
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
     }
 
-    /// The last preview of a scene. Without a number of samples, the coarse first picture, with one sample for each of
-    /// its own pixels.
+    /// The last preview of a scene. If `samples` is `None`, the coarse preview with one sample for each of its pixels.
     fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");
@@ -70,7 +69,7 @@ impl Studio {
         Arc::unwrap_or_clone(latest.expect("a preview").picture)
     }
 
-    /// The pictures of a render on their way to the last one.
+    /// The previews of a render, up to the last one.
     fn pictures(&mut self, scene: &str) -> Vec<(Picture, Fidelity)> {
         let steps = [
             (None, Fidelity::First),
@@ -84,7 +83,7 @@ impl Studio {
     }
 }
 
-/// A painter and the terminal behind it.
+/// A painter and the terminal it writes to.
 struct Screen {
     window: Rect,
     painter: Painter,
@@ -98,7 +97,7 @@ impl Screen {
         Self { window, painter: Painter::new(ColorDepth::TrueColor), terminal }
     }
 
-    /// Bytes until a picture is shown.
+    /// Number of bytes until an image is shown.
     fn show(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
         let mut buffer = Buffer::empty(self.window);
         let place = Rect::new(2, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
@@ -125,7 +124,7 @@ impl Screen {
         }
     }
 
-    /// The largest difference of a channel between the screen and a picture.
+    /// The largest difference of a channel between the screen and an image.
     fn difference(&self, picture: &Picture) -> u8 {
         let pixels = picture.pixels.iter().enumerate();
         let off = pixels.map(|(i, wanted)| {
@@ -145,7 +144,7 @@ impl Screen {
     }
 }
 
-/// RGB of a colour, with xterm's palette.
+/// RGB of a color in xterm's palette.
 fn rgb(color: vt100::Color) -> [u8; 3] {
     match color {
         vt100::Color::Rgb(r, g, b) => [r, g, b],
@@ -154,7 +153,7 @@ fn rgb(color: vt100::Color) -> [u8; 3] {
             let index = usize::from(index - 16);
             [index / 36, index / 6 % 6, index % 6].map(|step| [0, 95, 135, 175, 215, 255][step])
         }
-        other => unreachable!("{other:?} is of no picture"),
+        other => unreachable!("{other:?} is not an image color"),
     }
 }
 
@@ -163,7 +162,7 @@ fn scene(name: &str) -> String {
     std::fs::read_to_string(path).expect("a bundled scene")
 }
 
-/// Cells that differ in more than the last bit.
+/// Cells that differ by more than the last bit.
 fn changed(a: &Picture, b: &Picture) -> usize {
     let width = a.width as usize;
     let is_off = |i: usize| (0..3).any(|k| a.pixels[i][k].abs_diff(b.pixels[i][k]) > 1);
@@ -171,19 +170,19 @@ fn changed(a: &Picture, b: &Picture) -> usize {
     tops.filter(|i| is_off(*i) || is_off(i + width)).count()
 }
 
-/// Shows a whole render on the screen; returns the bytes of its first picture and of all.
+/// Shows a whole render on the screen; returns the number of bytes for its first preview and for all.
 fn through(screen: &mut Screen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
     let (last, _) = pictures.last().expect("pictures");
     let off = screen.difference(last);
-    assert!(off <= 1, "the last picture is off by {off}");
-    assert_eq!(screen.show(last, Fidelity::Still), 0, "nothing when nothing changes");
+    assert!(off <= 1, "the last image differs by {off}");
+    assert_eq!(screen.show(last, Fidelity::Still), 0, "an unchanged image sends nothing");
     (sent[0], sent.iter().sum())
 }
 
 #[test]
-fn renders_and_edits_stay_within_their_bytes_and_end_exactly() {
+fn renders_and_edits_stay_within_byte_budgets() {
     let green = "green = { diffuse = [0.13, 0.45, 0.09] }";
     let red = "red = { diffuse = [0.70, 0.13, 0.10]";
     let edits = [
@@ -202,7 +201,7 @@ fn renders_and_edits_stay_within_their_bytes_and_end_exactly() {
         let [(old_last, _), (new_last, _)] = [&old, &new].map(|pictures| pictures.last().expect("pictures"));
         let cells = old_last.pixels.len() / 2;
         let (first, all) = through(&mut screen, &old);
-        assert!(first <= 12 * cells, "{place}: {first} bytes for a first picture of {cells} cells");
+        assert!(first <= 12 * cells, "{place}: {first} bytes for a first preview of {cells} cells");
         assert!(all <= 48 * cells, "{place}: {all} bytes for {cells} cells");
         let edited = changed(old_last, new_last);
         let (_, all) = through(&mut screen, &new);

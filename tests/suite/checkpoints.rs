@@ -1,4 +1,4 @@
-//! Checkpoints: whatever ends a render, --resume brings the pixels of the one that was never stopped.
+//! Checkpoints: however a render ends, --resume gives the same pixels as a render that was never interrupted.
 
 use std::fs;
 use std::process::{Child, Stdio};
@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
+use crate::parts::{METHODS, ROOM, room_dir};
 use crate::test_dir::TestDir;
-use crate::parts::{METHODS, ROOM, dir};
 
-/// Random numbers below one.
+/// Random numbers in [0, 1).
 fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut next = glimt::math::random::unit(seed);
     move || f64::from(next())
@@ -20,18 +20,18 @@ fn begin(dir: &TestDir, line: &str) -> Child {
     dir.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
 }
 
-/// Runs it with an exit code; returns what it says as one line, as messages are wrapped.
+/// Runs it and checks the exit code; returns stderr as one line, because messages are wrapped.
 #[track_caller]
 fn said(dir: &TestDir, line: &str, code: i32) -> String {
     dir.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn end(mut child: Child, signal: Signal) -> Option<i32> {
-    kill(Pid::from_raw(child.id() as i32), signal).expect("it runs still, or waits for its parent");
+    kill(Pid::from_raw(child.id() as i32), signal).expect("the process exists");
     child.wait().expect("a child").code()
 }
 
-/// No temporary file of a killed writer is left once somebody has written there again.
+/// Checks that a killed writer's temporary files are gone after the next write.
 fn assert_no_leftovers(dir: &TestDir) {
     let names =
         fs::read_dir(dir.0.path()).expect("a folder").map(|entry| entry.expect("an entry").file_name());
@@ -39,7 +39,7 @@ fn assert_no_leftovers(dir: &TestDir) {
     assert!(left.is_empty(), "{left:?}");
 }
 
-/// Renders that last some seconds in small pictures.
+/// Small renders that take a few seconds.
 const LONG: [(&str, &str); 4] = [
     ("whitted", "--samples 4096"),
     ("path", "--integrator path --samples 1024"),
@@ -48,19 +48,19 @@ const LONG: [(&str, &str); 4] = [
 ];
 
 #[test]
-fn killed_at_any_time_the_old_image_is_whole_and_the_next_one_has_the_same_pixels() {
+fn killed_render_resumes_to_the_same_pixels() {
     kill_at_any_time(4);
 }
 
 #[test]
 #[ignore = "twenty seconds: cargo test --release --test suite killed_20_times -- --ignored"]
-fn killed_20_times_at_any_time() {
+fn killed_20_times_at_random() {
     kill_at_any_time(20);
 }
 
-/// Kills renders by each method at random times.
+/// Kills renders of each method at random times.
 fn kill_at_any_time(times: u32) {
-    let dir = dir();
+    let dir = room_dir();
     let mut next = random(3);
     for (method, options) in LONG {
         dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
@@ -76,32 +76,32 @@ fn kill_at_any_time(times: u32) {
                 kills += 1;
                 continue;
             }
-            // It was done: once more from the beginning.
+            // The render was finished: start over.
             assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}: neither");
             dir.write("out.exr", "the image before");
             let _ = fs::remove_file(dir.path("out.exr.checkpoint"));
         }
         dir.expect(&line, 0);
         assert!(dir.bytes("out.exr") == dir.bytes("one.exr"), "{method}");
-        assert!(!dir.path("out.exr.checkpoint").exists(), "{method}: the render is done");
+        assert!(!dir.path("out.exr.checkpoint").exists(), "{method}: the checkpoint is removed");
         assert_no_leftovers(&dir);
     }
 }
 
 #[test]
-fn killed_while_it_writes_a_checkpoint_is_the_one_before_or_the_new_one() {
+fn kill_during_a_write_keeps_a_whole_checkpoint() {
     kill_while_it_writes(50);
 }
 
 #[test]
 #[ignore = "sixteen seconds: cargo test --release --test suite killed_200_times -- --ignored"]
-fn killed_200_times_while_it_writes_a_checkpoint() {
+fn killed_200_times_while_writing_a_checkpoint() {
     kill_while_it_writes(200);
 }
 
-/// Writes checkpoints all the time: the kill meets a write.
+/// Writes checkpoints continuously, so that each kill hits a write.
 fn kill_while_it_writes(times: u32) {
-    let dir = dir();
+    let dir = room_dir();
     let mut next = random(5);
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
     for number in 0..times {
@@ -109,7 +109,7 @@ fn kill_while_it_writes(times: u32) {
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
         end(child, Signal::SIGKILL);
         if dir.path("out.exr.checkpoint").exists() {
-            // A whole one is of another seed; one that is not would be called damaged.
+            // An intact checkpoint is rejected because of its seed, a damaged one because it is damaged.
             let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
             assert!(said.contains("seed is 0 there and 9 here"), "{number}: {said}");
         }
@@ -117,11 +117,11 @@ fn kill_while_it_writes(times: u32) {
     assert!(dir.path("out.exr.checkpoint").exists());
 }
 
-/// Whether the machine is fast enough is no matter of the program's.
+/// Ignored by default: the result depends on the speed of the machine.
 #[test]
 #[ignore = "measures time, 84 s: cargo test --release --test suite hangup -- --ignored"]
-fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
-    let dir = dir();
+fn hangup_writes_a_checkpoint_within_two_seconds() {
+    let dir = room_dir();
     let is_over = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let load = std::thread::available_parallelism().map_or(2, usize::from);
     let busy = (0..load).map(|_| {
@@ -136,7 +136,7 @@ fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
     for options in ["", "--integrator path", "--photons on --set photons.count=10000", "--error 0.001"] {
         let size = format!("--width 3840 --height 2160 --samples 100000 {options}");
         let child = begin(&dir, &format!("room.toml --once --progress none -o out.exr {size}"));
-        // Until every pixel has a sample.
+        // Wait until every pixel has a sample.
         std::thread::sleep(Duration::from_secs(20));
         let sent = Instant::now();
         assert_eq!(end(child, Signal::SIGHUP), Some(129));
@@ -144,7 +144,7 @@ fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
         let bytes = fs::metadata(dir.path("out.exr.checkpoint")).expect("a checkpoint").len();
         eprintln!("{options:?}: ended after {seconds:.2} s with a checkpoint of {} MB", bytes / 1_000_000);
         assert!(seconds < 2.0, "{options}: {seconds} s");
-        // It is whole: what differs is found behind its digest.
+        // The checkpoint is intact: settings are compared after its digest.
         let said = self::said(&dir, &format!("room.toml --once -o out.exr {size} --seed 9 --resume"), 2);
         assert!(said.contains("seed is 0 there and 9 here"), "{said}");
         fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
@@ -154,8 +154,8 @@ fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
 }
 
 #[test]
-fn signals_leave_a_checkpoint_and_the_image_comes_out_the_same() {
-    let dir = dir();
+fn signal_leaves_a_checkpoint_to_resume() {
+    let dir = room_dir();
     for ((method, options), (signal, code)) in LONG.into_iter().zip([
         (Signal::SIGTERM, 143),
         (Signal::SIGHUP, 129),
@@ -165,7 +165,7 @@ fn signals_leave_a_checkpoint_and_the_image_comes_out_the_same() {
         dir.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
         let line = format!("room.toml --once --progress none -o out.exr {options}");
         let child = begin(&dir, &line);
-        // Wait until there is something to keep: a signal before that leaves nothing.
+        // Wait for samples to save: an earlier signal leaves nothing.
         std::thread::sleep(Duration::from_millis(300));
         let ended = end(child, signal);
         if dir.path("out.exr").exists() {
@@ -180,15 +180,15 @@ fn signals_leave_a_checkpoint_and_the_image_comes_out_the_same() {
     }
 }
 
-/// A finished render whose checkpoint stays.
+/// Renders to the end and keeps the checkpoint.
 fn kept(dir: &TestDir, options: &str) {
     dir.expect(&format!("room.toml --once --progress none -o out.exr --keep-checkpoint {options}"), 0);
     assert!(dir.path("out.exr.checkpoint").exists());
 }
 
 #[test]
-fn a_finished_render_is_extended_to_the_pixels_of_a_longer_one() {
-    let dir = dir();
+fn finished_render_extends_to_a_longer_one() {
+    let dir = room_dir();
     for (method, options) in METHODS {
         let (head, samples) = options.split_once("--samples ").expect("samples");
         let (samples, rest) = samples.split_once(' ').unwrap_or((samples, ""));
@@ -207,8 +207,8 @@ fn a_finished_render_is_extended_to_the_pixels_of_a_longer_one() {
 }
 
 #[test]
-fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
-    let dir = dir();
+fn checkpoint_of_another_image_is_rejected() {
+    let dir = room_dir();
     kept(&dir, "");
     let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
     let refused = |options: &str, words: &str| {
@@ -234,7 +234,7 @@ fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
         dir.write(name, before);
     }
     assert!(dir.bytes("out.exr.checkpoint") == checkpoint);
-    // What does not change the picture is no other picture.
+    // Edits that do not affect the image do not invalidate the checkpoint.
     dir.write("room.toml", format!("# a comment\n{ROOM}\n[materials.unused]\n"));
     dir.expect("room.toml --once --progress none -o out.exr --resume --threads 1 --keep-checkpoint", 0);
     assert!(dir.bytes("out.exr") == image);
@@ -243,8 +243,8 @@ fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
 }
 
 #[test]
-fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
-    let dir = dir();
+fn damaged_checkpoint_is_rejected() {
+    let dir = room_dir();
     kept(&dir, "");
     let (image, checkpoint) = (dir.bytes("out.exr"), dir.bytes("out.exr.checkpoint"));
     let mut next = random(8);
@@ -264,15 +264,15 @@ fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
 }
 
 #[test]
-fn what_is_not_asked_for_is_said_and_not_done() {
-    let dir = dir();
+fn checkpoints_are_used_only_with_resume() {
+    let dir = room_dir();
     let said = self::said(&dir, "room.toml --once -o out.exr --resume", 0);
     assert!(said.contains("there is no out.exr.checkpoint: starting from the beginning"), "{said}");
     kept(&dir, "");
     let said = self::said(&dir, "room.toml --once -o out.exr", 0);
     assert!(said.contains("out.exr.checkpoint is of this picture, and is not used"), "{said}");
-    assert!(!dir.path("out.exr.checkpoint").exists(), "the picture is done");
-    // A render that took longer is not lost to one that was begun without --resume.
+    assert!(!dir.path("out.exr.checkpoint").exists(), "the image is finished");
+    // A longer render's checkpoint survives a new render without --resume.
     let line = "room.toml --once --progress none -o out.exr --samples 100000";
     let child = begin(&dir, line);
     std::thread::sleep(Duration::from_millis(2500));
@@ -282,17 +282,17 @@ fn what_is_not_asked_for_is_said_and_not_done() {
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(dir.bytes("out.exr.checkpoint.before") == longer);
-    // Nor to another picture, which has less aside.
+    // It also survives a render of another image, whose checkpoint is shorter.
     let child = begin(&dir, &format!("{line} --seed 5"));
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(dir.bytes("out.exr.checkpoint.before") == longer);
     fs::rename(dir.path("out.exr.checkpoint.before"), dir.path("out.exr.checkpoint")).expect("moved");
-    // Nor to a draft that is done.
+    // It also survives a finished draft.
     dir.expect("room.toml --once --progress none -o out.exr --samples 1", 0);
     assert!(dir.bytes("out.exr.checkpoint") == longer);
     fs::remove_file(dir.path("out.exr.checkpoint")).expect("removed");
-    // One of another picture stays, as does what is no checkpoint.
+    // A checkpoint of another image survives, as does a file that is not a checkpoint.
     kept(&dir, "");
     dir.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
     assert!(dir.path("out.exr.checkpoint").exists());
@@ -306,19 +306,19 @@ fn what_is_not_asked_for_is_said_and_not_done() {
     assert!(!dir.path("other.exr.checkpoint").exists(), "0 is never");
 }
 
-/// Waits until a file is there.
+/// Waits until a file exists.
 #[track_caller]
 fn await_file(dir: &TestDir, name: &str) {
     let deadline = Instant::now() + Duration::from_secs(60);
     while !dir.path(name).exists() {
-        assert!(Instant::now() < deadline, "{name} does not come");
+        assert!(Instant::now() < deadline, "{name} does not appear");
         std::thread::sleep(Duration::from_millis(5));
     }
 }
 
 #[test]
-fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
-    let dir = dir();
+fn running_process_keeps_its_checkpoint() {
+    let dir = room_dir();
     let line = "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05";
     let seed_is = |seed: u32| {
         let said = self::said(&dir, "room.toml --once -o out.exr --seed 9 --resume", 2);
@@ -326,7 +326,7 @@ fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
     };
     let first = begin(&dir, &format!("{line} --seed 1"));
     await_file(&dir, "out.exr.checkpoint");
-    // Another render to the same image, and the same one once more, keep none, and say so once.
+    // A second render to the same image, even with the same settings, writes no checkpoint and reports this once.
     for options in ["--seed 2", "--seed 1 --resume"] {
         let mut second = dir.glimt(&format!("{line} {options}"));
         let second = second.stderr(Stdio::piped()).spawn().expect("it runs");
@@ -341,11 +341,11 @@ fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
         assert!(said.contains("no picture was written"), "{said}");
         seed_is(1);
     }
-    // A finished image of the same render takes nothing away from it.
+    // A finished image of the same render leaves the running one's checkpoint alone.
     dir.expect("room.toml --once --progress none -o out.exr --samples 1 --seed 1", 0);
     seed_is(1);
     assert!(!dir.path("out.exr.checkpoint.before").exists());
-    // What nobody keeps any more makes way.
+    // Once its process has ended, a checkpoint can be replaced.
     end(first, Signal::SIGKILL);
     let child = begin(&dir, &format!("{line} --seed 2"));
     await_file(&dir, "out.exr.checkpoint.before");
@@ -355,9 +355,9 @@ fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
 }
 
 #[test]
-fn no_room_for_a_checkpoint_is_said_once_and_the_image_is_written() {
-    let dir = dir();
-    // Blocks of 512 bytes: a checkpoint has 150 kB, the image 8.
+fn full_disk_reports_the_checkpoint_once() {
+    let dir = room_dir();
+    // In blocks of 512 bytes: a checkpoint has 150 kB, the image 8.
     let limited = |blocks: u32, line: &str| {
         let program = dir.glimt("").get_program().to_owned();
         let mut shell = std::process::Command::new("sh");
@@ -373,7 +373,7 @@ fn no_room_for_a_checkpoint_is_said_once_and_the_image_is_written() {
     assert_eq!(code, Some(0), "{said}");
     assert_eq!(said.to_lowercase().matches(why).count(), 1, "{said}");
     assert!(said.contains("wrote out.png"), "{said}");
-    // No room for the image either.
+    // There is no room for the image either.
     dir.write("out.png", "the image before");
     let (code, said) = limited(2, &format!("{line} -o out.png"));
     assert_eq!(code, Some(1), "{said}");
@@ -384,8 +384,8 @@ fn no_room_for_a_checkpoint_is_said_once_and_the_image_is_written() {
 }
 
 #[test]
-fn a_render_without_checkpoints_goes_on_from_one_all_the_same() {
-    let dir = dir();
+fn render_without_checkpoints_can_resume() {
+    let dir = room_dir();
     kept(&dir, "--samples 2");
     dir.expect("room.toml --once --progress none -o one.exr --samples 5", 0);
     let said = self::said(&dir, "room.toml --once -o out.exr --samples 5 --resume --checkpoint 0", 0);
@@ -395,8 +395,8 @@ fn a_render_without_checkpoints_goes_on_from_one_all_the_same() {
 }
 
 #[test]
-fn a_pipe_in_the_place_of_a_checkpoint_or_a_part_holds_nothing_up() {
-    let dir = dir();
+fn pipe_instead_of_a_checkpoint_never_blocks() {
+    let dir = room_dir();
     for name in ["out.exr.checkpoint", "a.part"] {
         nix::unistd::mkfifo(&dir.path(name), nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     }
@@ -407,8 +407,8 @@ fn a_pipe_in_the_place_of_a_checkpoint_or_a_part_holds_nothing_up() {
 }
 
 #[test]
-fn a_checkpoint_of_another_version_makes_way_and_is_not_replaced() {
-    let dir = dir();
+fn newer_checkpoint_is_moved_not_replaced() {
+    let dir = room_dir();
     kept(&dir, "");
     let mut newer = dir.bytes("out.exr.checkpoint");
     newer[12] = 2;
@@ -420,8 +420,8 @@ fn a_checkpoint_of_another_version_makes_way_and_is_not_replaced() {
 }
 
 #[test]
-fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
-    let dir = dir();
+fn resume_keeps_finished_and_foreign_parts() {
+    let dir = room_dir();
     for options in
         ["--samples 5", "--photons on --samples 40 --set photons.count=500", "--samples 64 --error 0.2"]
     {
@@ -430,7 +430,7 @@ fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
         let part = dir.bytes("a.part");
         let report = dir.report(&format!("{} --resume --progress none", line.replace(" --once", "")));
         assert!(dir.bytes("a.part") == part, "{options}");
-        assert_eq!(report["counters"]["camera_rays"], 0, "{options}: nothing is rendered again");
+        assert_eq!(report["counters"]["camera_rays"], 0, "{options}: no ray is traced again");
         let said = self::said(&dir, &format!("{line} --resume"), 0);
         assert!(said.contains("a.part is finished already"), "{said}");
         for (other, words) in [
@@ -444,7 +444,7 @@ fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
             assert!(said.contains(words) && said.contains("leave --resume out to replace it"), "{said}");
             assert!(dir.bytes("a.part") == part, "{options} {other}");
         }
-        // One that is not whole is rendered again.
+        // A truncated part is rendered again.
         dir.write("a.part", &part[..part.len() / 2]);
         let said = self::said(&dir, &format!("{line} --resume"), 0);
         assert!(said.contains("a.part is not used: it ends at byte"), "{said}");
@@ -454,8 +454,8 @@ fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
 }
 
 #[test]
-fn parts_have_checkpoints_too() {
-    let dir = dir();
+fn part_resumes_from_its_own_checkpoint() {
+    let dir = room_dir();
     let options = "--photons on --samples 100 --set photons.count=2000";
     dir.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
     for index in 1..=2 {
@@ -470,7 +470,7 @@ fn parts_have_checkpoints_too() {
     }
     dir.expect("merge joined.exr 1.part 2.part --progress none", 0);
     assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
-    // That of one part is none of another.
+    // The checkpoint of one part is not used for another part.
     let child = begin(&dir, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));

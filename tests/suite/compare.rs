@@ -1,4 +1,4 @@
-//! `glimt compare` from outside: figures, exit codes, messages, files.
+//! `glimt compare` as a process: metrics, exit codes, messages, files.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -26,7 +26,7 @@ fn floats(value: impl Fn(u32, u32, u32) -> f32) -> Rgb32FImage {
     ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| value(x, y, c))))
 }
 
-/// A dir with the picture and its reference in every format that keeps their bytes, and in floats.
+/// A directory with the image and its reference in every lossless format, and as floats.
 fn dir() -> TestDir {
     let dir = TestDir::new();
     for ending in ["png", "ppm", "tga", "bmp", "webp"] {
@@ -55,8 +55,8 @@ fn assert_near(object: &Value, key: &str, expected: f64) {
     assert!((value - expected).abs() <= 1e-6 * expected.abs().max(1.0), "{key}: {value}, not {expected}");
 }
 
-/// Checks figures that numpy computed in double precision from the bytes, decoded by the sRGB curve; SSIM is by
-/// scikit-image 0.26, FLIP 0.107067652 by flip-evaluator 1.7, in single precision.
+/// Checks metrics that numpy computed in double precision from the bytes, decoded from sRGB. SSIM is from scikit-image
+/// 0.26; FLIP 0.107067652 is from flip-evaluator 1.7, in single precision.
 #[track_caller]
 fn assert_figures_of_bytes(object: &Value) {
     for (key, expected) in [
@@ -76,7 +76,7 @@ fn assert_figures_of_bytes(object: &Value) {
 }
 
 #[test]
-fn files_of_every_kind_give_the_figures_of_numpy() {
+fn every_format_gives_the_metrics_of_numpy() {
     let dir = dir();
     for (a, b) in [("png", "png"), ("ppm", "tga"), ("bmp", "webp"), ("webp", "png")] {
         let (object, stderr) = json(&dir, &format!("a.{a} b.{b}"), 0);
@@ -87,7 +87,7 @@ fn files_of_every_kind_give_the_figures_of_numpy() {
 }
 
 #[test]
-fn sixteen_bits_and_floats_hold_the_same_picture() {
+fn sixteen_bits_and_floats_give_equal_metrics() {
     let dir = dir();
     let wide =
         ImageBuffer::from_fn(SIZE.0, SIZE.1, |x, y| Rgb([0, 1, 2].map(|c| u16::from(judged(x, y, c)) * 257)));
@@ -111,7 +111,7 @@ fn sixteen_bits_and_floats_hold_the_same_picture() {
 }
 
 #[test]
-fn values_of_float_files_are_taken_as_they_are() {
+fn float_values_are_compared_unchanged() {
     let dir = dir();
     floats(|_, _, _| -0.5).save(dir.path("dark.exr")).expect("written");
     floats(|_, _, _| 100.0).save(dir.path("bright.exr")).expect("written");
@@ -122,7 +122,7 @@ fn values_of_float_files_are_taken_as_they_are() {
 }
 
 #[test]
-fn the_table_is_for_people() {
+fn table_lists_every_metric() {
     let dir = dir();
     let output = dir.run("compare a.png b.png");
     assert_eq!(output.status.code(), Some(0));
@@ -146,7 +146,7 @@ fn the_table_is_for_people() {
 }
 
 #[test]
-fn the_bound_decides_the_exit_code() {
+fn threshold_decides_the_exit_code() {
     let dir = dir();
     let (object, stderr) = json(&dir, "a.png b.png --max-relmse 0.5", 0);
     assert_eq!(
@@ -171,7 +171,7 @@ fn the_bound_decides_the_exit_code() {
 }
 
 #[test]
-fn wrong_calls_and_files_are_told_in_words() {
+fn compare_reports_wrong_calls_and_files() {
     let dir = dir();
     dir.expect("compare a.png", 2);
     dir.expect("compare a.png b.png a.ppm", 2);
@@ -191,7 +191,7 @@ fn wrong_calls_and_files_are_told_in_words() {
 }
 
 #[test]
-fn values_that_are_not_finite_are_counted_and_placed() {
+fn non_finite_values_are_counted_and_located() {
     let dir = dir();
     let spoilt = |x, y, c| match (x, y, c) {
         (5, 3, 2) => f32::NAN,
@@ -208,7 +208,7 @@ fn values_that_are_not_finite_are_counted_and_placed() {
 }
 
 #[test]
-fn one_file_twice_is_warned_of() {
+fn comparing_a_file_with_itself_warns() {
     let dir = dir();
     symlink("a.png", dir.path("link.png")).expect("a link");
     let (object, stderr) = json(&dir, "a.png a.png", 0);
@@ -219,7 +219,7 @@ fn one_file_twice_is_warned_of() {
 }
 
 #[test]
-fn the_error_is_written_as_a_picture() {
+fn diff_writes_the_error_image() {
     let dir = dir();
     let (_, stderr) = json(&dir, "a.exr b.exr --diff d.exr", 0);
     assert_eq!(stderr, "wrote d.exr (|a - b| of each channel, linear)\n");
@@ -238,11 +238,11 @@ fn the_error_is_written_as_a_picture() {
     dir.write("copy.png", dir.bytes("b.png"));
     json(&dir, "copy.png b.png --diff d.png", 0);
     let black = image::open(dir.path("d.png")).expect("a PNG").into_rgb8();
-    assert!(black.pixels().all(|pixel| pixel.0 == [0; 3]), "no error is black");
+    assert!(black.pixels().all(|pixel| pixel.0 == [0; 3]), "zero error is black");
 }
 
 #[test]
-fn the_error_is_never_written_over_a_picture_that_is_compared() {
+fn diff_never_replaces_a_compared_image() {
     let dir = dir();
     symlink("a.png", dir.path("soft.png")).expect("a link");
     fs::hard_link(dir.path("b.png"), dir.path("hard.png")).expect("a link");
@@ -263,7 +263,7 @@ fn the_error_is_never_written_over_a_picture_that_is_compared() {
 }
 
 #[test]
-fn where_the_error_cannot_be_written_is_told_before_the_work() {
+fn diff_target_is_checked_first() {
     let dir = dir();
     let stderr = dir.expect("compare a.png b.png --diff d.gif", 2);
     assert!(stderr.contains(".gif is not a format that glimt writes"), "{stderr}");
@@ -272,11 +272,11 @@ fn where_the_error_cannot_be_written_is_told_before_the_work() {
 }
 
 #[test]
-fn pictures_of_glimt_are_near_themselves_in_other_formats_and_other_seeds() {
+fn renders_differ_only_by_format_and_noise() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --progress none -o a.exr -o a.png -o a.hdr --seed 1", 0);
     dir.expect("ball.toml --once --progress none -o b.exr --seed 2", 0);
     let relmse = |line: &str| json(&dir, line, 0).0["relmse"].as_f64().expect("a number");
     assert!(relmse("a.png a.exr") < 1e-3 && relmse("a.hdr a.exr") < 1e-3);
-    assert!(relmse("b.exr a.exr") > relmse("a.hdr a.exr"), "another seed is other noise");
+    assert!(relmse("b.exr a.exr") > relmse("a.hdr a.exr"), "a different seed gives different noise");
 }

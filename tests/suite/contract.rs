@@ -1,4 +1,4 @@
-//! The contract of the scene file: every key, by its name, with its default, and which keys are required.
+//! The contract of the scene file: every key with its default, and which keys are required.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,9 +10,9 @@ use glimt::scene::{parse, starter};
 /// Promise about a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Promise {
-    /// Optional; the default is the value of the example.
+    /// Optional; the default is the value in the example.
     Default,
-    /// Optional; the default is another value.
+    /// Optional; the default differs from the example.
     Other,
     /// Required.
     Required,
@@ -23,7 +23,7 @@ use Promise::{Default, Other, Required};
 /// Name, example, promise.
 type Key = (&'static str, &'static str, Promise);
 
-/// The tables with all their keys, and examples of the values.
+/// The tables with all their keys and example values.
 const TABLES: &[(&str, &[Key])] = &[
     (
         "[render]",
@@ -293,10 +293,10 @@ const TABLES: &[(&str, &[Key])] = &[
     ),
 ];
 
-/// Other elements to which the materials refer.
+/// The other elements that the materials refer to.
 const BUMPS: &str = "[textures.bumps]\nfile = \"textures/bumps.png\"\n";
 
-/// A folder with everything that the example names; returns the scene's path too.
+/// A directory with every file the example names, and the path of the scene in it.
 fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["scenes/textures", "assets"] {
@@ -315,7 +315,7 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (folder, scene)
 }
 
-/// The whole example, with some keys left out of the tables by their numbers.
+/// The whole example without the listed keys.
 fn example(is_out: impl Fn(usize, &str) -> bool) -> String {
     let mut text = String::from(BUMPS);
     for (table, (header, keys)) in TABLES.iter().enumerate() {
@@ -327,13 +327,13 @@ fn example(is_out: impl Fn(usize, &str) -> bool) -> String {
     text
 }
 
-/// The messages of the errors among diagnostics.
+/// The messages of all errors.
 pub(crate) fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
     let errors = diagnostics.iter().filter(|one| one.severity == Severity::Error);
     errors.map(|one| one.message.as_str()).collect()
 }
 
-/// The scene without places in the file, which differ if something is left out.
+/// The scene without source positions, which change when a key is left out.
 pub(crate) fn placeless(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
     scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);
@@ -344,7 +344,7 @@ pub(crate) fn placeless(mut scene: Scene) -> Scene {
 }
 
 #[test]
-fn every_key_may_be_left_out_but_those_marked() {
+fn unmarked_keys_are_optional() {
     let (_folder, path) = folder();
     let outcome = |text: String| parse(text.into(), &path);
     let whole = outcome(example(|_, _| false));
@@ -352,7 +352,7 @@ fn every_key_may_be_left_out_but_those_marked() {
     let whole = placeless(whole.scene.expect("a scene"));
     for (table, (header, keys)) in TABLES.iter().enumerate() {
         for &(key, _, promise) in *keys {
-            // A phong material has no `reflectance`; what is not the default is tried by itself below.
+            // A Phong material has no `reflectance`. Non-default values are tested below.
             if key == "type" && promise == Other {
                 continue;
             }
@@ -371,7 +371,7 @@ fn every_key_may_be_left_out_but_those_marked() {
 }
 
 #[test]
-fn an_environment_without_a_map_is_black() {
+fn environment_without_a_map_is_black() {
     let (_folder, path) = folder();
     let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let color = |text: &str| {
@@ -383,7 +383,7 @@ fn an_environment_without_a_map_is_black() {
 }
 
 #[test]
-fn a_table_of_required_keys_alone_is_enough() {
+fn required_keys_suffice() {
     let (_folder, path) = folder();
     let is_kept = |table: usize, key: &str| {
         let (_, keys) = TABLES[table];
@@ -397,7 +397,7 @@ fn a_table_of_required_keys_alone_is_enough() {
 }
 
 #[test]
-fn the_camera_may_be_an_orbiter() {
+fn camera_accepts_an_orbiter() {
     let (_folder, path) = folder();
     let outcome = parse("[camera]\norbiter = \"camera.txt\"\n".into(), &path);
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
@@ -405,7 +405,7 @@ fn the_camera_may_be_an_orbiter() {
 }
 
 #[test]
-fn a_mesh_may_be_placed_by_a_matrix() {
+fn mesh_accepts_a_matrix() {
     let (_folder, path) = folder();
     let scene = |placed: &str| {
         let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.a]\n";
@@ -422,7 +422,7 @@ fn a_mesh_may_be_placed_by_a_matrix() {
 }
 
 #[test]
-fn every_word_that_this_version_has_is_known() {
+fn every_choice_is_accepted() {
     let (_folder, path) = folder();
     let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let words: &[(&str, &[&str])] = &[
@@ -450,7 +450,7 @@ fn every_word_that_this_version_has_is_known() {
 }
 
 #[test]
-fn the_ends_of_the_promised_ranges_are_in_them() {
+fn ranges_include_their_limits() {
     let (_folder, path) = folder();
     let said = |text: &str| {
         let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
@@ -516,7 +516,7 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
 }
 
 #[test]
-fn paths_in_a_scene_are_seen_from_its_folder() {
+fn paths_are_relative_to_the_scene() {
     let (folder, path) = folder();
     let outcome = parse(example(|_, _| false).into(), &path);
     let scene = outcome.scene.expect("a scene");
@@ -526,19 +526,19 @@ fn paths_in_a_scene_are_seen_from_its_folder() {
 }
 
 #[test]
-fn the_starter_has_every_key() {
+fn starter_has_every_key() {
     for (header, keys) in TABLES {
         for (key, ..) in *keys {
             let has = |line: &str| line.trim_start_matches("# ").starts_with(&format!("{key} = "));
             assert!(starter().lines().any(has), "starter: {header} {key}");
         }
     }
-    // Any shape may have one.
+    // Any shape may have a material.
     assert!(starter().contains("# name = "), "name");
 }
 
 #[test]
-fn every_line_of_the_starter_may_be_uncommented() {
+fn starter_lines_can_be_uncommented() {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["bricks.png", "knot.obj", "sky.hdr"] {
         fs::write(folder.path().join(name), "").expect("written");
@@ -549,7 +549,7 @@ fn every_line_of_the_starter_may_be_uncommented() {
             || text.contains(" = ") && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')
     };
     let uncommented = |line: &str| match line.strip_prefix("# ") {
-        // It stands in place of others.
+        // This table excludes other tables.
         Some(text) if is_key(text) && !["orbiter", "matrix"].iter().any(|key| text.starts_with(key)) => {
             format!("{text}\n")
         }

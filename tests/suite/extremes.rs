@@ -1,4 +1,4 @@
-//! Scenes at the limits: they render, every sample is finite, in bounded time and memory; and the bundled scenes.
+//! Scenes at the limits: every sample is finite, in bounded time and memory. Also renders the bundled scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ const MIRROR: &str = "type = \"mirror\"\nreflectance = [1, 1, 1]";
 const GLASS: &str = "type = \"glass\"\nior = 1.5";
 const CAMERA: &str = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
 const LAMP: &str = "[[light]]\ntype = \"point\"\nposition = [1, 3, 2]\nintensity = [10, 10, 10]\n";
-/// Far above what any of these scenes takes.
+/// Far more than any of these scenes takes.
 const MEMORY_BYTES: u64 = 400 << 20;
 
 fn sphere(center: &str, radius: &str) -> String {
@@ -33,7 +33,7 @@ fn lamp(position: &str, intensity: &str) -> String {
     format!("[[light]]\ntype = \"point\"\nposition = [{position}]\nintensity = [{intensity}]\n")
 }
 
-/// Renders it, as a picture and as a float file; checks that every sample is finite.
+/// Renders a scene as an image and as a float file, and checks that every sample is finite.
 #[track_caller]
 fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -> serde_json::Value {
     let dir = TestDir::new();
@@ -41,10 +41,7 @@ fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -
         "a.obj",
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 2 0 0\nv 0 1e-30 0\nf 1 2 3\nf 1 2 4\nf 1 2 6\n",
     );
-    dir.write(
-        "a.toml",
-        format!("[render]\n{render}\n[camera]\n{camera}\n[materials.m]\n{material}\n{rest}"),
-    );
+    dir.write("a.toml", format!("[render]\n{render}\n[camera]\n{camera}\n[materials.m]\n{material}\n{rest}"));
     let report = dir.report("a.toml -o a.png -o a.exr");
     assert_eq!(report["counters"]["non_finite_samples"], 0, "{name}");
     assert_eq!(report["image"]["complete"], true, "{name}");
@@ -56,7 +53,7 @@ fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -
 const SMALL: &str = "width = 16\nheight = 12\nsamples = 2";
 
 #[test]
-fn pictures_of_extreme_shape() {
+fn extreme_image_sizes_render() {
     let rest = sphere("0, 1, 0", "0.5") + LAMP;
     for size in ["width = 1\nheight = 1", "width = 65536\nheight = 1", "width = 1\nheight = 65536"] {
         renders(size, &format!("{size}\nsamples = 1"), CAMERA, PHONG, &rest);
@@ -66,7 +63,7 @@ fn pictures_of_extreme_shape() {
 }
 
 #[test]
-fn shapes_of_extreme_size_and_place() {
+fn extreme_shapes_render() {
     for rest in [
         sphere("0, 1, 0", "1e-18"),
         sphere("0, 1, 0", "1e17"),
@@ -102,7 +99,7 @@ fn shapes_of_extreme_size_and_place() {
 }
 
 #[test]
-fn cameras_at_the_limits() {
+fn extreme_cameras_render() {
     let rest = sphere("0, 1, 0", "0.5") + LAMP;
     for camera in [
         "position = [0, 1, 4]\nlook_at = [0, 1, 0]\nfov = 179.9",
@@ -120,7 +117,7 @@ fn cameras_at_the_limits() {
 }
 
 #[test]
-fn lights_at_the_limits() {
+fn extreme_lights_render() {
     let ball = sphere("0, 1, 0", "0.5");
     for lamp in [
         lamp("1, 3, 2", "1e18, 1e18, 1e18"),
@@ -152,7 +149,7 @@ fn lights_at_the_limits() {
 }
 
 #[test]
-fn materials_at_the_limits() {
+fn extreme_materials_render() {
     let rest = sphere("0, 1, 0", "0.5") + LAMP;
     for material in [
         "type = \"phong\"\nspecular = [0.3, 0.3, 0.3]\nshininess = 0",
@@ -169,7 +166,7 @@ fn materials_at_the_limits() {
 }
 
 #[test]
-fn light_that_never_leaves() {
+fn lossless_closed_room_terminates() {
     let walls = quad("-9, -9, -1", "18, 0, 0", "0, 18, 0") + &quad("-9, -9, 9", "18, 0, 0", "0, 18, 0");
     let closed = "[[box]]\ncenter = [0, 1, 0]\nsize = [20, 20, 20]\nmaterial = \"m\"\n";
     for depth in [0, 10_000] {
@@ -183,7 +180,7 @@ fn light_that_never_leaves() {
 }
 
 #[test]
-fn a_hundred_thousand_spheres() {
+fn hundred_thousand_spheres_render() {
     let mut rest = LAMP.to_owned();
     for i in 0..100_000_u32 {
         let coordinate = |shift: u32| f64::from(i.wrapping_mul(2_654_435_761) >> shift & 1023) / 100.0 - 5.0;
@@ -203,13 +200,13 @@ fn bundled() -> Vec<PathBuf> {
     scenes
 }
 
-/// Whether a file that the scene names is generated only on demand.
+/// Whether a file that the scene names is only generated on demand.
 fn is_made_on_demand(scene: &Path) -> bool {
     scene.file_stem().is_some_and(|stem| stem == "million" || stem == "figure")
 }
 
 #[test]
-fn bundled_scenes_are_right_and_the_same_with_any_number_of_threads() {
+fn bundled_scenes_ignore_the_thread_count() {
     for scene in bundled().iter().filter(|scene| !is_made_on_demand(scene)) {
         let dir = TestDir::new();
         let path = scene.display();
@@ -225,7 +222,7 @@ fn bundled_scenes_are_right_and_the_same_with_any_number_of_threads() {
                 let picture = |threads: u32| dir.bytes(&format!("{threads}.{ending}"));
                 assert!(
                     picture(1) == picture(2) && picture(1) == picture(7),
-                    "{path} .{ending} by {integrator}"
+                    "{path} .{ending} with {integrator}"
                 );
             }
         }

@@ -1,4 +1,4 @@
-//! Malformed files: a clear error, exit code 2, nothing on stdout, the old picture left as it was, at once and in
+//! Malformed files: a clear error, exit code 2, nothing on stdout, the previous image unchanged, quickly and with
 //! little memory.
 
 use std::fs::{self, File};
@@ -8,15 +8,15 @@ use std::path::Path;
 use std::process::Command as Process;
 use std::time::{Duration, Instant};
 
-use super::test_dir::{TestDir, SCENE};
+use super::test_dir::{SCENE, TestDir};
 
-/// Longest time of a refusal; it takes milliseconds, and a program that reads on takes minutes.
+/// Time limit for a rejection: it takes milliseconds, while reading on would take minutes.
 const AT_ONCE: Duration = Duration::from_secs(10);
 
 const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-/// A scene that names `file` in one of the possible ways, and the line and column of that.
+/// A scene that names `file` in one of the possible ways, and the line and column where it does.
 fn scene(file: &str) -> (String, &'static str) {
     let ending = Path::new(file).extension().and_then(|ending| ending.to_str());
     let (text, place) = match ending {
@@ -33,7 +33,7 @@ fn scene(file: &str) -> (String, &'static str) {
     (text.replace("FILE", file), place)
 }
 
-/// Renders a scene, and checks that it is refused with all of these words.
+/// Renders a scene, and checks that it is rejected with all of these words.
 #[track_caller]
 fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     dir.write("ball.png", "the old one");
@@ -47,7 +47,8 @@ fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
     stderr
 }
 
-/// Makes something that is not a proper file; returns the words of its refusal. `None` if it cannot be made here.
+/// Creates something that is not a regular file; returns words of the expected error. `None` if it cannot be created
+/// here.
 fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
     Some(match what {
         "missing" => &["there is no", "file"],
@@ -64,7 +65,7 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
             &["is a pipe, a socket or a device, not a"]
         }
         "kernel" => {
-            // On a machine without such a file, this is a link to nowhere.
+            // On a machine without such a file, this link is dangling.
             if !Path::new("/proc/kmsg").exists() {
                 return None;
             }
@@ -100,7 +101,7 @@ const KINDS: [&str; 9] =
     ["missing", "folder", "pipe", "device", "kernel", "circle", "dangling", "terabytes", "locked"];
 
 #[test]
-fn a_scene_that_is_no_file() {
+fn scene_must_be_a_regular_file() {
     for what in KINDS {
         let dir = TestDir::new();
         if let Some(words) = make(&dir.path("bad.toml"), what) {
@@ -111,7 +112,7 @@ fn a_scene_that_is_no_file() {
 }
 
 #[test]
-fn an_asset_that_is_no_file() {
+fn asset_must_be_a_regular_file() {
     for what in KINDS {
         for ending in ["obj", "off", "ply", "png", "jpg", "hdr", "exr", "txt"] {
             let dir = TestDir::new();
@@ -128,7 +129,7 @@ fn an_asset_that_is_no_file() {
 }
 
 #[test]
-fn an_asset_with_the_wrong_content() {
+fn assets_with_wrong_content_are_rejected() {
     let noise: Vec<u8> = (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     let zeros = vec![0; 5000];
     for (ending, empty, wrong) in [
@@ -153,7 +154,7 @@ fn an_asset_with_the_wrong_content() {
             dir.write(&file, bytes);
             refused(&dir, "scene.toml", &[wrong, &place]);
         }
-        // The start of a gigabyte of zeros is enough to refuse it.
+        // The start of a gigabyte of zeros is enough to reject it.
         let huge = File::create(dir.path(&file)).and_then(|file| file.set_len(1 << 30));
         huge.expect("a sparse file");
         refused(&dir, "scene.toml", &[&file, &place]);
@@ -161,7 +162,7 @@ fn an_asset_with_the_wrong_content() {
 }
 
 #[test]
-fn a_gigabyte_and_bytes_that_are_no_text_as_a_scene() {
+fn huge_and_binary_scenes_are_rejected() {
     let dir = TestDir::new();
     File::create(dir.path("huge.toml")).and_then(|file| file.set_len(1 << 30)).expect("a sparse file");
     refused(&dir, "huge.toml", &["huge.toml", "larger than", "[[mesh]]"]);
@@ -176,7 +177,7 @@ fn a_gigabyte_and_bytes_that_are_no_text_as_a_scene() {
     refused(&dir, "zeros.toml", &["zeros.toml", "binary file"]);
 }
 
-/// Checks that a mesh is refused with these words, at its place in the scene.
+/// Checks that a mesh is rejected with these words, at its position in the scene.
 #[track_caller]
 fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
     let dir = TestDir::new();
@@ -187,7 +188,7 @@ fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
 }
 
 #[test]
-fn meshes_that_cannot_be_used() {
+fn unusable_meshes_are_rejected() {
     let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
     mesh_refused("a.obj", format!("{vertices}f 1 2 4\n").as_bytes(), &["a.obj:4: "]);
     mesh_refused("a.obj", format!("{vertices}f 1 2 -4\n").as_bytes(), &["a.obj:4: "]);
@@ -216,7 +217,7 @@ fn meshes_that_cannot_be_used() {
 }
 
 #[test]
-fn faces_that_cannot_be_used_are_counted_and_the_rest_is_rendered() {
+fn unusable_faces_are_counted_and_left_out() {
     let dir = TestDir::new();
     let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nv 1e999 1 1\n";
     dir.write("a.obj", format!("{vertices}f 1 2 3\nf 1 2 4\nf 1 2 5\nf 1 1 2\n"));
@@ -228,13 +229,13 @@ fn faces_that_cannot_be_used_are_counted_and_the_rest_is_rendered() {
 }
 
 #[test]
-fn material_files() {
+fn material_file_mistakes_warn() {
     for what in KINDS {
         let dir = TestDir::new();
         let Some(_) = make(&dir.path("bad.mtl"), what) else { continue };
         dir.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
         let (text, _) = scene("a.obj");
-        // The scene has a material for it: no warning.
+        // The scene has a material for the mesh: no warning.
         dir.write("scene.toml", &text);
         let stderr = dir.expect("scene.toml --once -o a.png", 0);
         assert!(!stderr.contains("warning"), "{what}: {stderr}");
@@ -260,7 +261,7 @@ fn material_files() {
 }
 
 #[test]
-fn pictures_that_lie_about_their_size() {
+fn images_with_false_sizes_are_rejected() {
     let png = {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 60_000, 60_000);
@@ -283,7 +284,7 @@ fn pictures_that_lie_about_their_size() {
 }
 
 #[test]
-fn what_stands_beside_a_picture_takes_no_memory() {
+fn image_metadata_takes_no_memory() {
     const BOMB: usize = 256 << 20;
     type Add = fn(&mut png::Encoder<'_, &mut Vec<u8>>, String) -> Result<(), png::EncodingError>;
     let zeros = || "0".repeat(BOMB);
@@ -311,17 +312,12 @@ fn what_stands_beside_a_picture_takes_no_memory() {
         let dir = TestDir::new();
         dir.write("a.png", file);
         dir.write("scene.toml", scene("a.png").0);
-        // By a shell: what a process took counts for the program that takes its place.
+        // Use a shell: the memory of the shell counts for the program that replaces it.
         let program = dir.glimt("").get_program().to_owned();
         let mut shell = Process::new("sh");
         let line = "\"$0\" scene.toml --once -o out.png --report report.json; exit $?";
-        let status = shell
-            .args(["-c", line])
-            .arg(program)
-            .current_dir(dir.0.path())
-            .output()
-            .expect("it runs")
-            .status;
+        let status =
+            shell.args(["-c", line]).arg(program).current_dir(dir.0.path()).output().expect("it runs").status;
         assert!(status.success(), "{name}: {status}");
         let report: serde_json::Value = serde_json::from_slice(&dir.bytes("report.json")).expect("JSON");
         let bytes = report["peak_memory_bytes"].as_u64().expect("bytes");
@@ -331,7 +327,7 @@ fn what_stands_beside_a_picture_takes_no_memory() {
 }
 
 #[test]
-fn a_line_end_in_a_name_ends_no_line() {
+fn newline_in_a_name_is_escaped() {
     let dir = TestDir::new();
     let run = |arguments: &[&str]| {
         let mut process = dir.glimt("");
@@ -377,7 +373,7 @@ fn a_line_end_in_a_name_ends_no_line() {
     }
 }
 
-/// Characters that a terminal would act on, or not show.
+/// Characters that a terminal would interpret, or not show.
 const EVIL: &str = "\u{1b}]52;c;ZXZpbA==\u{7}\u{1b}[2J\u{9b}31m\r\u{202e}gnp\u{8}";
 
 #[track_caller]
@@ -388,11 +384,11 @@ fn assert_harmless(output: &std::process::Output, code: i32) {
     assert!(!text.chars().any(harmful), "{text:?}");
     assert!(output.stdout.iter().all(|byte| *byte == b'\n' || !byte.is_ascii_control()));
     let is_named = text.contains("31m") || text.contains("0000001b");
-    assert!(is_named || !output.stdout.is_empty(), "the name is not there: {text}");
+    assert!(is_named || !output.stdout.is_empty(), "the name is missing: {text}");
 }
 
 #[test]
-fn names_reach_the_terminal_without_teeth() {
+fn names_are_escaped_for_the_terminal() {
     let dir = TestDir::new();
     let toml: String = EVIL.chars().map(|c| format!("\\U{:08x}", u32::from(c))).collect();
     let run = |arguments: &[&str]| {
@@ -452,7 +448,7 @@ fn names_reach_the_terminal_without_teeth() {
 }
 
 #[test]
-fn a_path_that_is_no_text() {
+fn paths_may_be_invalid_utf8() {
     let dir = TestDir::new();
     let name = std::ffi::OsStr::from_bytes(b"b\xff\x1b[2J.toml");
     fs::write(dir.0.path().join(name), SCENE).expect("written");

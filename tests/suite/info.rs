@@ -1,4 +1,4 @@
-//! `glimt info`: how a picture was made.
+//! `glimt info`: how an image was made.
 
 use serde_json::Value;
 
@@ -6,7 +6,7 @@ use super::test_dir::TestDir;
 
 const SMALL: &str = "--once --width 16 --height 12 --samples 2";
 
-/// Text of `glimt info` on stdout.
+/// The stdout of `glimt info`.
 fn info(dir: &TestDir, line: &str, code: i32) -> String {
     let output = dir.run(&format!("info {line}"));
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");
@@ -15,7 +15,7 @@ fn info(dir: &TestDir, line: &str, code: i32) -> String {
 }
 
 #[test]
-fn every_format_says_how_it_was_made() {
+fn every_format_records_how_it_was_made() {
     let dir = TestDir::new();
     let outputs = ["a.png", "a.exr", "a.hdr", "a.jpg", "a.ppm"];
     let options: String = outputs.iter().map(|name| format!(" -o {name}")).collect();
@@ -45,7 +45,7 @@ fn every_format_says_how_it_was_made() {
 }
 
 #[test]
-fn layers_and_parts_say_what_they_hold() {
+fn info_lists_layers_and_parts() {
     let dir = TestDir::new();
     dir.expect(&format!("ball.toml {SMALL} -o a.exr --layers depth,samples"), 0);
     let text = info(&dir, "a.exr", 0);
@@ -56,7 +56,7 @@ fn layers_and_parts_say_what_they_hold() {
 }
 
 #[test]
-fn what_glimt_did_not_make_and_what_is_no_picture() {
+fn info_on_foreign_images_and_other_files() {
     let dir = TestDir::new();
     let text = info(&dir, "ball.toml", 2);
     assert!(text.is_empty());
@@ -64,12 +64,12 @@ fn what_glimt_did_not_make_and_what_is_no_picture() {
     assert!(stderr.contains("cannot read none.png: no such file"), "{stderr}");
     dir.write("d.png", foreign());
     assert!(info(&dir, "d.png", 1).contains("unknown: the file does not tell"));
-    // Names and values may hold what a terminal acts on.
+    // Names and values may contain characters that a terminal interprets.
     dir.write("e.ppm", b"P6\n# glimt:scene: a\x1b[31mred\n1 1\n255\nabc");
     assert!(!info(&dir, "e.ppm", 1).contains('\u{1b}'));
 }
 
-/// A picture without texts.
+/// An image without text chunks.
 fn foreign() -> Vec<u8> {
     let mut bytes = Vec::new();
     let picture = image::RgbImage::new(3, 2);

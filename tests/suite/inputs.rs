@@ -1,4 +1,4 @@
-//! A render never overwrites an input file of its picture, whatever name leads to it.
+//! A render never overwrites an input of its image, whatever path leads to it.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -6,17 +6,17 @@ use std::os::unix::fs::symlink;
 use glimt::system::machine::ProcessIdentity;
 use serde_json::json;
 
-use super::test_dir::{TestDir, SCENE};
 use super::gltf::Glb;
+use super::test_dir::{SCENE, TestDir};
 
-/// A picture that glimt did not write: a red texel.
+/// An image that glimt did not write: one red texel.
 const PHOTOGRAPH: &[u8] = b"P6\n1 1\n255\n\xff\x20\x20";
 
-/// Options of an endless render, so that a refusal after the work would be noticed.
+/// Options of an endless render, so that a late rejection would be noticed.
 const ENDLESS: &str = "--once --samples 4000000000 --time 2";
 
-/// A ball with a texture, a mesh with a material file and its pictures, an orbiter camera, and a texture that no
-/// material uses.
+/// A ball with a texture, a mesh with a material file and its images, an orbiter camera, and a texture that no material
+/// uses.
 fn studio() -> TestDir {
     let dir = TestDir::new();
     fs::create_dir(dir.path("deep")).expect("a folder");
@@ -41,7 +41,7 @@ fn studio() -> TestDir {
 
 const TEXTURES: &str = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.unused]\nfile = \"unused.ppm\"\n";
 
-/// Every file below the dir with its content; links are left out.
+/// Every file below the directory with its content, except links.
 fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     let mut folders = vec![dir.0.path().to_owned()];
     let mut found = Vec::new();
@@ -60,8 +60,8 @@ fn everything(dir: &TestDir) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     found
 }
 
-/// Runs it and checks: exit code 2, these words in the message, nothing rendered, every file unchanged. Returns the
-/// message.
+/// Runs it and checks that the exit code is 2, the message has these words, nothing is rendered and every file is
+/// unchanged. Returns the message.
 #[track_caller]
 fn refused(dir: &TestDir, line: &str, words: &[&str]) -> String {
     let before = everything(dir);
@@ -75,13 +75,13 @@ fn refused(dir: &TestDir, line: &str, words: &[&str]) -> String {
 }
 
 #[test]
-fn the_default_output_is_no_input() {
+fn default_output_never_replaces_an_input() {
     let dir = TestDir::new();
     let texture = "[textures.marble]\nfile = \"marble.png\"\n\n[materials.ball]";
     let scene =
         SCENE.replace("[materials.ball]", texture).replace("[0.8, 0.2, 0.1]", "{ texture = \"marble\" }");
     dir.write("marble.toml", scene);
-    // This picture was made by glimt: the default output could replace it, were it not an input.
+    // Glimt made this image: the default output could replace it if it were not an input.
     dir.expect("ball.toml --once -o marble.png", 0);
     let stderr = refused(&dir, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
     assert!(stderr.contains("marble.toml:11:8") && stderr.contains("`output = "), "{stderr}");
@@ -89,7 +89,7 @@ fn the_default_output_is_no_input() {
 }
 
 #[test]
-fn a_scene_by_the_name_of_its_picture_stays() {
+fn scene_named_like_its_image_is_kept() {
     let dir = TestDir::new();
     dir.write("scene.png", SCENE);
     refused(&dir, &format!("scene.png {ENDLESS}"), &["scene.png", "the scene file", "-o"]);
@@ -100,7 +100,7 @@ fn a_scene_by_the_name_of_its_picture_stays() {
 }
 
 #[test]
-fn no_name_of_an_input_is_an_output() {
+fn no_path_to_an_input_is_an_output() {
     let dir = studio();
     let skin = dir.path("skin.ppm");
     symlink("skin.ppm", dir.path("link.ppm")).expect("a link");
@@ -122,7 +122,7 @@ fn no_name_of_an_input_is_an_output() {
         refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, "skin.ppm", "texture `skin`"]);
         refused(&dir, &format!("scene.toml {ENDLESS} -o good.png -o {output}"), &[output]);
     }
-    // A folder by another name; `..` behind a link is where the link leads, and there is no skin.ppm.
+    // A folder with another name; `..` after a link is relative to the link's target, where there is no skin.ppm.
     refused(
         &dir,
         &format!("scene.toml {ENDLESS} -o elsewhere/wood.ppm"),
@@ -136,45 +136,45 @@ fn no_name_of_an_input_is_an_output() {
 }
 
 #[test]
-fn every_kind_of_input_stays() {
+fn every_kind_of_input_is_kept() {
     let dir = studio();
     for (output, role) in [
         ("skin.ppm", "texture `skin`"),
         ("unused.ppm", "texture `unused`"),
         ("deep/wood.ppm", "one.obj"),
         ("deep/bumps.ppm", "one.obj"),
-        // The material file names these, though nothing looks them up.
+        // The material file names these, although nothing uses them.
         ("deep/alpha.ppm", "one.obj"),
     ] {
         let stderr = refused(&dir, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
-        assert!(stderr.contains("--> scene.toml:"), "{output}: where the scene names it: {stderr}");
+        assert!(stderr.contains("--> scene.toml:"), "{output}: position in the scene: {stderr}");
     }
     for (report, role) in [
         ("scene.toml", "the scene file"),
         ("camera.txt", "orbiter"),
         ("deep/one.obj", "mesh"),
-        // Seen to be no report before the mesh is read.
+        // Rejected as a report before the mesh is read.
         ("deep/materials.json", "is not a report that glimt wrote"),
         ("deep/one.mtl", "is not a report that glimt wrote"),
         ("deep/wood.ppm", "is not a report that glimt wrote"),
-        // This file does not exist yet, and is read as soon as it does.
+        // This file does not exist yet, and is read once it does.
         ("deep/gone.mtl", "one.obj"),
     ] {
         refused(&dir, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
         refused(&dir, &format!("scene.toml {ENDLESS} --report deep/../{report}"), &[report, role]);
     }
-    // Materials of the file that the scene replaces: still its pictures.
+    // Materials of the file that the scene overrides: their images are inputs all the same.
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
     refused(&dir, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
 }
 
 #[test]
-fn every_picture_that_a_gltf_file_names_stays() {
+fn images_named_by_a_gltf_file_are_kept() {
     let dir = TestDir::new();
     let mut glb = Glb::default();
     let positions = glb.vectors(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-    // An occlusion map, the picture of a material that no face has, and one that no texture has: none is looked up.
+    // An occlusion map, the image of a material without faces, and one without a texture: none is used.
     let json = json!({
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -213,7 +213,7 @@ fn every_picture_that_a_gltf_file_names_stays() {
 }
 
 #[test]
-fn an_output_that_the_scene_names_is_compared_too() {
+fn output_key_never_names_an_input() {
     let dir = studio();
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     dir.write("scene.toml", text.replace("[render]", "[render]\noutput = \"deep/../skin.ppm\""));
@@ -225,7 +225,7 @@ fn an_output_that_the_scene_names_is_compared_too() {
 }
 
 #[test]
-fn outputs_and_the_report_are_files_of_their_own() {
+fn outputs_and_report_must_differ() {
     let dir = TestDir::new();
     fs::create_dir_all(dir.path("o/p")).expect("folders");
     symlink("o", dir.path("q")).expect("a link");
@@ -254,12 +254,12 @@ fn outputs_and_the_report_are_files_of_their_own() {
 }
 
 #[test]
-fn by_default_only_a_picture_of_glimt_is_replaced() {
+fn default_output_replaces_only_glimt_images() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once", 0);
     let own = dir.bytes("ball.png");
     dir.expect("ball.toml --once --seed 3", 0);
-    assert_ne!(dir.bytes("ball.png"), own, "its own picture is replaced");
+    assert_ne!(dir.bytes("ball.png"), own, "its own image is replaced");
     let ways = ["ball.png", "-o", "`output = "];
     let truncated = &own[..20];
     let mut other = own.clone();
@@ -269,20 +269,20 @@ fn by_default_only_a_picture_of_glimt_is_replaced() {
         dir.write("ball.png", foreign);
         refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     }
-    // As any encoder writes it, without glimt's text.
+    // As any encoder writes it, without glimt's text chunk.
     image::RgbImage::new(3, 2).save(dir.path("ball.png")).expect("a photograph");
     refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
     dir.write("photo.png", dir.bytes("ball.png"));
     fs::remove_file(dir.path("ball.png")).expect("removed");
     symlink("photo.png", dir.path("ball.png")).expect("a link");
     refused(&dir, &format!("ball.toml {ENDLESS}"), &ways);
-    // An explicit output is meant.
+    // An explicit output is replaced.
     dir.expect("ball.toml --once -o ball.png", 0);
     assert_eq!(dir.bytes("photo.png").len(), own.len());
     dir.expect("ball.toml --once", 0);
     fs::remove_file(dir.path("photo.png")).expect("removed");
     dir.expect("ball.toml --once", 0);
-    assert_eq!(dir.bytes("photo.png"), own, "a link to a file that is not there yet");
+    assert_eq!(dir.bytes("photo.png"), own, "a dangling link");
     let scene = SCENE.replace("[render]", "[render]\noutput = \"own.png\"");
     dir.write("ball.toml", scene);
     dir.write("own.png", PHOTOGRAPH);
@@ -291,7 +291,7 @@ fn by_default_only_a_picture_of_glimt_is_replaced() {
 }
 
 #[test]
-fn a_report_replaces_reports_and_nothing_else() {
+fn report_replaces_only_reports() {
     let dir = TestDir::new();
     let report = |name: &str| dir.expect(&format!("ball.toml --once --report {name}"), 0);
     for name in ["new", "new", "new.txt", "new.txt", "r.json"] {
@@ -314,7 +314,7 @@ fn a_report_replaces_reports_and_nothing_else() {
 }
 
 #[test]
-fn an_input_by_the_name_of_a_temporary_file_stays() {
+fn input_named_like_a_temporary_file_is_kept() {
     let dir = studio();
     let text = fs::read_to_string(dir.path("scene.toml")).expect("the scene");
     let mut ended = std::process::Command::new("true").spawn().expect("true starts");
@@ -332,7 +332,7 @@ fn an_input_by_the_name_of_a_temporary_file_stays() {
 }
 
 #[test]
-fn new_takes_the_place_of_nothing() {
+fn new_never_overwrites() {
     let dir = TestDir::new();
     symlink("nowhere.toml", dir.path("dangling.toml")).expect("a link");
     symlink("ball.toml", dir.path("link.toml")).expect("a link");
@@ -348,9 +348,9 @@ fn new_takes_the_place_of_nothing() {
 }
 
 #[test]
-fn the_map_of_an_environment_is_no_output() {
+fn environment_map_is_never_an_output() {
     let dir = TestDir::new();
-    // One map is read, and one is only named: a black factor needs no map.
+    // One map is used, the other only named: a black factor needs no map.
     for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
         dir.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
         dir.write("sky.ppm", PHOTOGRAPH);
@@ -375,7 +375,7 @@ fn the_map_of_an_environment_is_no_output() {
 }
 
 #[test]
-fn files_that_the_call_replaces_stay_inputs_of_the_scene() {
+fn overridden_files_are_kept() {
     let dir = studio();
     dir.write("other.ppm", PHOTOGRAPH);
     dir.write("deep/two.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

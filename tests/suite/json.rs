@@ -1,11 +1,10 @@
-//! JSON and XML that glimt writes: all of it is valid, and without a character that a terminal would act on or not
-//! show.
+//! JSON and XML written by glimt: valid, and without characters that a terminal would interpret or not show.
 
 use serde_json::Value;
 
-use super::test_dir::{TestDir, SCENE};
+use super::test_dir::{SCENE, TestDir};
 
-/// C1, DEL, a turn of the writing's direction, a joiner, a tag above the basic plane, an umlaut.
+/// C1, DEL, a bidirectional override, a joiner, a tag outside the basic plane, an umlaut.
 const NAME: &str = "a\u{9b}31m\u{7f}\u{202e}b\u{200d}c\u{e0041}ä\u{1}.toml";
 
 #[track_caller]
@@ -29,13 +28,13 @@ fn run(dir: &TestDir, arguments: &[&str]) -> std::process::Output {
 }
 
 #[test]
-fn every_json_is_valid_and_harmless() {
+fn all_json_is_valid_and_harmless() {
     let dir = TestDir::new();
     dir.write(NAME, SCENE);
     let output = run(&dir, &[NAME, "--once", "--report", "-", "--progress", "json"]);
     let report = object(harmless(&output.stdout));
     assert_eq!(report["scene"], NAME);
-    assert!(harmless(&output.stdout).contains('ä'), "what is harmless is written as it is");
+    assert!(harmless(&output.stdout).contains('ä'), "harmless characters are unchanged");
     let events: Vec<Value> = harmless(&output.stderr).lines().map(object).collect();
     let written = events.iter().find(|event| event["event"] == "written").expect("a picture");
     let picture = NAME.replace(".toml", ".png");
@@ -52,7 +51,7 @@ fn every_json_is_valid_and_harmless() {
 }
 
 #[test]
-fn what_bench_writes_of_an_odd_name_is_json_and_xml() {
+fn bench_escapes_odd_names_in_json_and_xml() {
     let dir = TestDir::new();
     dir.write(NAME, SCENE);
     let line = "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache \
@@ -65,11 +64,11 @@ fn what_bench_writes_of_an_odd_name_is_json_and_xml() {
     let document = roxmltree::Document::parse(harmless(&plot)).expect("XML");
     let is_named =
         |node: roxmltree::Node<'_, '_>| node.text().is_some_and(|text| text.contains("ä␁.toml, 8×"));
-    assert!(document.descendants().any(is_named), "the name is there, with stand-ins");
+    assert!(document.descendants().any(is_named), "the name appears, with replacements");
 }
 
 #[test]
-fn check_says_as_json_what_it_says_in_words() {
+fn check_json_has_the_same_diagnostics() {
     let dir = TestDir::new();
     let scene = SCENE.replace("width", "widht").replace("radius", "raduis");
     dir.write("ball.toml", format!("# ä\n{scene}"));
@@ -93,7 +92,7 @@ fn check_says_as_json_what_it_says_in_words() {
 }
 
 #[test]
-fn check_of_a_scene_with_warnings_is_right_and_lists_them() {
+fn check_lists_warnings_and_succeeds() {
     let dir = TestDir::new();
     dir.write("ball.toml", format!("{SCENE}[materials.unused]\n"));
     let output = run(&dir, &["check", "--json", "ball.toml"]);

@@ -1,25 +1,25 @@
-//! Files that a write must keep: those that glimt did not write, and the attributes of a file beside its bytes.
+//! Files that a write must preserve: files that glimt did not write, and a file's attributes.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::Path;
 
-use super::test_dir::{TestDir, SCENE};
+use super::test_dir::{SCENE, TestDir};
 
-/// A file of somebody else whose name has the ending of a report.
+/// A foreign file with the extension of a report.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
-/// A file about a render that a person wrote.
+/// A file about a render, written by the user.
 const BY_HAND: &str = "{\n  \"glimt\": \"0.1.0\",\n  \"scene\": \"a.toml\",\n  \"seconds\": 3.5\n}\n";
-/// A render that would take for ever.
+/// A render that never ends.
 const ENDLESS: &str = "--once --samples 4000000 --width 4000";
-/// A measurement that would take for ever after its first messages.
+/// A measurement that never ends after its first messages.
 const LONG: &str = "--samples 4000000 --reference-samples 4000000 --progress none";
 /// A short one.
 const SHORT: &str =
     "--samples 1 --reference-samples 8 --seeds 1 --integrator path --width 8 --no-cache --progress none";
 
 #[test]
-fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
+fn report_never_replaces_a_foreign_file() {
     let dir = TestDir::new();
     let refused = |foreign: &[u8]| {
         dir.write("package.json", foreign);
@@ -39,7 +39,7 @@ fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
     refused(&dir.bytes("results.json"));
     dir.expect("ball.toml --once --report package.json --force", 0);
     let mut report: serde_json::Value = serde_json::from_slice(&dir.bytes("package.json")).expect("JSON");
-    // glimt replaces its own report without asking: as it is; with the keys of the contract alone, sorted and in one
+    // Glimt replaces its own reports without asking: unchanged; with only the keys of the contract, sorted, on one
     // line; and an empty file.
     let as_it_is = report.to_string();
     let keys = report.as_object_mut().expect("an object");
@@ -58,7 +58,7 @@ fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
 }
 
 #[test]
-fn force_replaces_no_input() {
+fn force_never_replaces_an_input() {
     let dir = TestDir::new();
     let stderr = dir.expect(&format!("ball.toml {ENDLESS} --report ball.toml --force"), 2);
     assert!(stderr.contains("it is the scene file"), "{stderr}");
@@ -70,7 +70,7 @@ fn force_replaces_no_input() {
 }
 
 #[test]
-fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
+fn bench_never_replaces_a_foreign_file() {
     let dir = TestDir::new();
     let bench = |line: &str, code: i32| {
         let output = dir.run(&format!("bench ball.toml {line}"));
@@ -109,16 +109,16 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
     }
     let all = "--json a.json --csv a.csv --plot a.svg";
     bench(&format!("{SHORT} {all} --force"), 0);
-    // The same with a column more, or another end of the line.
+    // The same with an extra column, or with other line endings.
     let table = String::from_utf8(dir.bytes("a.csv")).expect("UTF-8");
     let (head, lines) = table.split_once("\r\n").expect("a first line");
     refused("--csv", "b.csv", &format!("{head},note\r\n{lines}"));
     refused("--csv", "b.csv", &format!("{head}\n{lines}"));
-    // The same with the words of somebody else before glimt's.
+    // The same with other words before glimt's.
     let plot = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     refused("--plot", "b.svg", &plot.replacen("<desc>", "<desc>somebody, with </desc>\n<desc>", 1));
     bench(&format!("{SHORT} {all}"), 0);
-    // A plot of a version that did not sign it.
+    // A plot from a version that did not sign it.
     let plot = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     let (start, rest) = plot.split_once("<desc>").expect("a signature");
     let (_, end) = rest.split_once("</desc>").expect("its end");
@@ -127,9 +127,9 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
     bench(&format!("{SHORT} {all}"), 0);
 }
 
-/// Only root can test this: the program runs as another user.
+/// Only root can run this test: the program runs as another user.
 #[test]
-fn an_owner_that_cannot_be_kept_is_said() {
+fn lost_ownership_is_reported() {
     use std::os::unix::process::CommandExt;
     let dir = TestDir::new();
     if fs::metadata(dir.0.path()).expect("a folder").uid() != 0 {
@@ -152,15 +152,15 @@ fn an_owner_that_cannot_be_kept_is_said() {
     let stderr = run("ball.toml --once -o a.png");
     assert!(stderr.contains(words), "{stderr}");
     assert_eq!(fs::metadata(dir.path("a.png")).expect("a file").uid(), 65534);
-    assert!(!run("ball.toml --once -o a.png").contains("could not be kept"), "it is its own now");
+    assert!(!run("ball.toml --once -o a.png").contains("could not be kept"), "the user owns it now");
     let events = run("ball.toml --once -o b.png --progress json");
     let done = events.lines().last().expect("the end");
     let done: serde_json::Value = serde_json::from_str(done).expect("JSON");
     assert_eq!(done["diagnostics"][0]["message"], "b.png: its owner and its group could not be kept");
 }
 
-/// A list as the kernel keeps it (posix_acl_xattr.h): rights of the owner, of user 4321, of the group, of all whom the
-/// mask limits, of others.
+/// An access control list as the kernel stores it (posix_acl_xattr.h): rights of the owner, user 4321, the group, the
+/// mask, others.
 fn access_list(named: u8, group: u8, mask: u8) -> Vec<u8> {
     const NOBODY: u32 = u32::MAX;
     let entries =
@@ -179,12 +179,12 @@ fn attribute(path: &Path, name: &str) -> Option<Vec<u8>> {
 }
 
 #[test]
-fn a_picture_keeps_the_access_list_and_the_attributes_of_the_file_that_it_replaces() {
+fn image_keeps_the_acl_and_attributes() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once -o a.png --report a.json", 0);
     for name in ["a.png", "a.json"] {
         let path = dir.path(name);
-        // A file system without them has nothing to lose.
+        // A file system without attributes has nothing to lose.
         if xattr::set(&path, "user.note", b"mine").is_err() {
             return;
         }
@@ -196,13 +196,13 @@ fn a_picture_keeps_the_access_list_and_the_attributes_of_the_file_that_it_replac
         let path = dir.path(name);
         assert_eq!(attribute(&path, "user.note").as_deref(), Some(b"mine".as_slice()), "{name}");
         assert_eq!(attribute(&path, ACCESS), Some(access_list(6, 0, 6)), "{name}");
-        // With a list, these are the mask: without it, they would be rights of the group.
+        // With an access control list, these bits are the mask; without it, they would be rights of the group.
         assert_eq!(fs::metadata(&path).expect("a file").mode() & 0o777, 0o660, "{name}");
     }
 }
 
 #[test]
-fn a_folder_s_default_list_gives_a_replaced_file_no_more_rights_than_it_had() {
+fn default_acl_never_widens_the_rights() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once -o a.png", 0);
     fs::set_permissions(dir.path("a.png"), fs::Permissions::from_mode(0o640)).expect("permitted");
@@ -217,7 +217,7 @@ fn a_folder_s_default_list_gives_a_replaced_file_no_more_rights_than_it_had() {
 }
 
 #[test]
-fn scenes_of_one_name_do_not_share_a_default_image() {
+fn scenes_of_one_name_keep_separate_images() {
     let dir = TestDir::new();
     for folder in ["a", "b"] {
         std::fs::create_dir(dir.path(folder)).expect("made");
@@ -232,7 +232,7 @@ fn scenes_of_one_name_do_not_share_a_default_image() {
     );
     assert!(said.contains("-o") && said.contains("--force"), "{said}");
     assert_eq!(dir.bytes("scene.png"), first);
-    // The same scene by another name, and from another folder by the absolute one.
+    // The same scene through another path, and from another folder through the absolute path.
     dir.expect("./b/../a/scene.toml --once --samples 2", 0);
     let absolute = dir.path("a/scene.toml");
     dir.expect(&format!("{} --once --samples 1", absolute.display()), 0);
@@ -240,11 +240,11 @@ fn scenes_of_one_name_do_not_share_a_default_image() {
     for way_out in ["-o b.png", "--force", "-o scene.png"] {
         dir.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
     }
-    // Turntables have their names checked, too.
+    // The names of a turntable are checked as well.
     dir.expect("a/scene.toml --once --samples 1 --turntable 2", 0);
     let said = dir.expect("b/scene.toml --once --samples 1 --turntable 2", 2);
     assert!(said.contains("another scene, a/scene.toml"), "{said}");
-    // Both are moved together.
+    // Scene and image are moved together.
     std::fs::create_dir(dir.path("moved")).expect("made");
     dir.expect("a/scene.toml --once --samples 1 --force", 0);
     for name in ["a", "scene.png"] {

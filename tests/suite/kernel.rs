@@ -1,4 +1,4 @@
-//! The ray kernel: no leak between triangles, no speck on flat faces, the same bits by all instruction sets.
+//! The ray kernel: no leaks between triangles, no speckles on flat faces, the same bits with all instruction sets.
 
 use std::collections::HashMap;
 
@@ -29,7 +29,7 @@ impl Random {
     }
 }
 
-/// A closed ball of radius 2 of `rings` rings of as many squares; bumps make every quad skew.
+/// A closed ball of radius 2 with `rings` rings of as many squares; bumps make every quad non-planar.
 fn ball(rings: u32, bumps: f32) -> TriangleMesh {
     let point = |ring: u32, column: u32| {
         let height = std::f32::consts::PI * ring as f32 / rings as f32;
@@ -58,7 +58,7 @@ fn ball(rings: u32, bumps: f32) -> TriangleMesh {
     mesh
 }
 
-/// The ball with every other ring almost on the one before: half of the triangles are needles.
+/// The ball with every other ring almost on the previous one: half of the triangles are needles.
 fn needles(rings: u32) -> TriangleMesh {
     let mut mesh = ball(rings, 0.0);
     for ring in (2..rings).step_by(2) {
@@ -70,7 +70,7 @@ fn needles(rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// The mesh, scaled and then moved.
+/// The mesh, first scaled and then moved.
 fn placed(mesh: &TriangleMesh, scale: f32, offset: Vec3) -> TriangleMesh {
     let positions = mesh.positions.iter().map(|&p| p * scale + offset).collect();
     TriangleMesh { positions, ..mesh.clone() }
@@ -81,7 +81,7 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
     tree.expect("nobody cancels")
 }
 
-/// Number of the rays from inside a closed mesh that escape; each is aimed at a vertex, or at an edge.
+/// Number of rays from inside a closed mesh that escape; each is aimed at a vertex or an edge.
 fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: InstructionSet) -> usize {
     let tree = tree(mesh).with(instructions);
     let mut random = Random(rays as u64);
@@ -109,7 +109,7 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
     leaks
 }
 
-/// [`leaks`] of the other tree.
+/// [`leaks`] for the other tree.
 fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -> usize {
     let count = mesh.triangles.len() as u32;
     let tree = KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
@@ -125,7 +125,7 @@ fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -
     leaks
 }
 
-/// Counts the leaks of `rays` rays in each place, by each tree and each instruction set.
+/// Counts the leaks of `rays` rays at each position, with each tree and each instruction set.
 fn assert_watertight(rays: usize) {
     let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
     let places =
@@ -172,7 +172,7 @@ fn boxes(side: u32) -> TriangleMesh {
     mesh
 }
 
-/// Distance at which a ray first enters a box of the grid, by slabs in double precision.
+/// Distance at which a ray first enters a box of the grid, with slabs in double precision.
 fn first_box(ray: &Ray, side: u32) -> f64 {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let enter = |cell: u32| {
@@ -194,7 +194,7 @@ fn first_box(ray: &Ray, side: u32) -> f64 {
 }
 
 #[test]
-fn boxes_show_no_speck_from_any_side() {
+fn boxes_show_no_speckle_from_any_side() {
     for side in [1, 3] {
         let mesh = boxes(side);
         let middle = Vec3::splat((side - 1) as f32 * 0.75 + 0.5);
@@ -202,7 +202,7 @@ fn boxes_show_no_speck_from_any_side() {
         for instructions in InstructionSet::ALL {
             let tree = tree(&mesh).with(instructions);
             for view in 0..1000 {
-                // The first looks are along the axes and their diagonals, where every ray lies in planes of faces.
+                // The first views are along the axes and their diagonals, where every ray lies in face planes.
                 let away = match view {
                     0..26 => {
                         let code = if view < 13 { view } else { view + 1 };
@@ -213,7 +213,7 @@ fn boxes_show_no_speck_from_any_side() {
                 let eye = middle + away.normalize() * 20.0;
                 for _ in 0..8 {
                     let target = match view % 3 {
-                        // Vertices and edges of boxes: rays that graze.
+                        // Vertices and edges of boxes: grazing rays.
                         0 => mesh.positions[random.below(mesh.positions.len())],
                         1 => {
                             let [a, b, c] = mesh.corners(random.below(mesh.triangles.len()) as u32);
@@ -229,7 +229,7 @@ fn boxes_show_no_speck_from_any_side() {
     }
 }
 
-/// Checks that a ray which enters a box, by more than rounding, hits it there, and that one which passes all boxes hits
+/// Checks that a ray which enters a box by more than rounding hits it there, and that a ray which misses all boxes hits
 /// none.
 fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     let shifted = |by: f32| {
@@ -249,8 +249,8 @@ fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     }
 }
 
-/// Distance at which a ray goes through a triangle, in double precision, with the least of its weights. `None` if it is
-/// parallel.
+/// Distance at which a ray crosses a triangle's plane, in double precision, and the smallest barycentric weight there.
+/// `None` if it is parallel.
 fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - ray.origin.as_dvec3());
     let (direction, normal) = (ray.direction.as_dvec3(), (b - a).cross(c - a));
@@ -260,10 +260,10 @@ fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     (sum != 0.0).then(|| (normal.dot(a) / normal.dot(direction), least))
 }
 
-/// Slivers of all widths, and rays that start right before or behind one, well inside its edges: hits that single precision
-/// cannot separate from the start are decided in double precision.
+/// Slivers of all widths, and rays that start just in front of or behind one, well inside its edges: hits that single
+/// precision cannot separate from the origin are decided in double precision.
 #[test]
-fn hits_right_at_the_start_of_a_ray_are_found() {
+fn hits_next_to_the_ray_origin_are_found() {
     let mut random = Random(91);
     let slivers: Vec<[Vec3; 3]> = (0..2000)
         .map(|_| {
@@ -272,12 +272,12 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
             [at, at + along, at + along * random.next() + random.vector() * width]
         })
         .collect();
-    // Points farther off than this have no crossing with `least` ≥ −0.02 on a ray of length 0.03.
+    // Points farther away than this have no crossing with `least` ≥ −0.02 on a ray of length 0.03.
     let around = |corners: &[Vec3; 3]| {
         let middle = corners.iter().sum::<Vec3>() / 3.0;
         (middle, corners.iter().map(|corner| (*corner - middle).length()).fold(0.0, f32::max) * 1.2 + 0.03)
     };
-    // Each cell of a grid knows the slivers that may be so near to a point in it.
+    // Each grid cell lists the slivers that may be this close to a point in it.
     let cell = |at: Vec3| at.to_array().map(|x| x.floor() as i32);
     let mut grid: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
     for (id, corners) in slivers.iter().enumerate() {
@@ -331,7 +331,7 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
 }
 
 #[test]
-fn all_instructions_make_the_same_picture() {
+fn all_instruction_sets_give_the_same_image() {
     for scene in ["mesh", "textures", "orbiter", "dof"] {
         let dir = TestDir::new();
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));

@@ -1,4 +1,4 @@
-//! `--layers`: channels beside the picture in EXR files.
+//! `--layers`: extra channels in EXR files.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::test_dir::TestDir;
 
 const SMALL: &str = "--once --width 32 --height 24";
 
-/// A floor with a glossy ball, a lamp and a sky.
+/// A floor with a glossy ball, an area light and a sky.
 const ROOM: &str = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 0.6, 0]\n[environment]\ncolor = [0.2, 0.3, 0.5]\n\
     [materials.floor]\n[materials.ball]\ndiffuse = [0.6, 0.1, 0.1]\nspecular = 0.3\nshininess = 40\n\
     [materials.mirror]\ntype = \"mirror\"\n[materials.lamp]\nemission = 5\n\
@@ -36,9 +36,9 @@ fn picture(dir: &TestDir, options: &str) -> Vec<f32> {
     image::open(dir.path("view.exr")).expect("a picture").to_rgb32f().into_raw()
 }
 
-/// The parts add up to the picture, also where noise decides the samples of each pixel, and with photons.
+/// The components add up to the beauty image, also where noise decides the number of samples, and with photons.
 #[test]
-fn parts_add_up_to_the_picture() {
+fn components_add_up_to_the_beauty_layer() {
     let dir = dir();
     for options in [
         "--integrator path --samples 64 --error 0.2",
@@ -64,7 +64,7 @@ fn parts_add_up_to_the_picture() {
 }
 
 #[test]
-fn layers_are_the_views_and_the_picture_is_that_without_them() {
+fn layers_equal_the_views() {
     let dir = dir();
     let same = "--samples 4 --error 0 --integrator path";
     dir.expect(&format!("room.toml {SMALL} {same} -o a.exr --layers depth,albedo,normal,variance"), 0);
@@ -96,7 +96,7 @@ fn layers_are_the_views_and_the_picture_is_that_without_them() {
     for (variance, error) in all["variance.X"].iter().zip(error.chunks(3)) {
         assert!((variance - error[0] * error[0]).abs() <= 1e-6 * variance, "{variance} {}", error[0]);
     }
-    // Normals are signed: the floor in front looks up, the sky has none.
+    // Normals are signed: the floor in front faces up, the sky has none.
     let at = |name: &str, x: usize, y: usize| all[name][y * 32 + x];
     assert_eq!([at("normal.X", 2, 23), at("normal.Y", 2, 23), at("normal.Z", 2, 23)], [0.0, 1.0, 0.0]);
     assert_eq!([at("normal.X", 1, 0), at("normal.Y", 1, 0), at("normal.Z", 1, 0)], [0.0; 3]);
@@ -104,7 +104,7 @@ fn layers_are_the_views_and_the_picture_is_that_without_them() {
 }
 
 #[test]
-fn layers_without_a_place_are_refused() {
+fn layers_need_an_exr_output() {
     let dir = dir();
     for (options, words) in [
         ("--once -o a.png --layers all", "--layers is for EXR files, and a.png is none"),

@@ -1,4 +1,4 @@
-//! The example of the library gives the picture of the program.
+//! The documented library example renders the same image as the program.
 
 #[allow(dead_code)]
 #[path = "../../docs/examples/picture.rs"]
@@ -7,7 +7,7 @@ mod picture;
 use crate::test_dir::TestDir;
 
 #[test]
-fn the_example_renders_what_the_program_renders() {
+fn library_example_matches_the_program() {
     let dir = TestDir::new();
     let at = |name: &str| dir.path(name).to_string_lossy().into_owned();
     picture::picture(&at("ball.toml"), &at("library.png")).expect("a picture");
@@ -17,7 +17,7 @@ fn the_example_renders_what_the_program_renders() {
 }
 
 #[test]
-fn a_mistake_in_the_scene_is_an_error_with_its_place() {
+fn library_errors_have_a_position() {
     let dir = TestDir::new();
     dir.write("wrong.toml", "[render]\nwidht = 3\n");
     let error = picture::picture(&dir.path("wrong.toml").to_string_lossy(), "").expect_err("a mistake");

@@ -1,4 +1,4 @@
-//! `glimt lsp` as an editor talks to it: over stdin and stdout of the process.
+//! `glimt lsp` as an editor talks to it, over the process's stdin and stdout.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Stdio};
@@ -11,7 +11,7 @@ const TEXT: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n\n[text
                     [materials.wall]\ntype = \"metal\"\ncolor = [1, 0.5, 0]\nroughness = { texture = \"bricks\" }\n\n\
                     [[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"wall\"\n\n[[light]]\n";
 
-/// An editor with one text open.
+/// An editor with one open text.
 struct Editor {
     child: Child,
     keys: ChildStdin,
@@ -56,7 +56,7 @@ impl Editor {
         let mut length = 0;
         loop {
             let mut line = String::new();
-            assert!(self.screen.read_line(&mut line).expect("a line") > 0, "the server is gone");
+            assert!(self.screen.read_line(&mut line).expect("a line") > 0, "the server has ended");
             match line.trim_end().split_once(": ") {
                 Some(("Content-Length", number)) => length = number.parse().expect("a number"),
                 Some(_) => {}
@@ -82,7 +82,7 @@ impl Editor {
         }
     }
 
-    /// The next list of mistakes for which `holds` is true.
+    /// The next list of diagnostics for which `holds` is true.
     fn mistakes(&mut self, holds: impl Fn(&[Value]) -> bool) -> Vec<Value> {
         loop {
             let message = self.hear();
@@ -104,7 +104,7 @@ impl Editor {
         );
     }
 
-    /// Asks about the place of `|` in a text, which the document becomes.
+    /// Sends a request at the position of `|` in a text, which becomes the document.
     fn at(&mut self, method: &str, text: &str) -> Value {
         let offset = text.find('|').expect("a cursor");
         self.change(&text.replacen('|', "", 1));
@@ -114,7 +114,7 @@ impl Editor {
         self.ask(method, &json!({ "textDocument": { "uri": self.uri }, "position": position }))
     }
 
-    /// The labels of what is offered at `|`, and what the first one inserts.
+    /// The labels of the completions at `|`, and the text that the first one inserts.
     fn offered(&mut self, text: &str) -> (Vec<String>, String) {
         let answer = self.at("textDocument/completion", text);
         let items = answer.as_array().cloned().unwrap_or_default();
@@ -132,7 +132,7 @@ impl Drop for Editor {
 }
 
 #[test]
-fn mistakes_are_shown_while_typing_and_those_of_files_after_a_save() {
+fn diagnostics_follow_edits_and_saves() {
     let mut editor = Editor::open(TEXT);
     assert_eq!(editor.mistakes(|_| true), [Value::Null; 0]);
     editor.change(&TEXT.replace("radius", "# ä\nraduis"));
@@ -146,7 +146,7 @@ fn mistakes_are_shown_while_typing_and_those_of_files_after_a_save() {
     );
     assert_eq!((&unknown["severity"], &unknown["source"]), (&json!(1), &json!("glimt")));
     assert!(unknown["message"].as_str().is_some_and(|text| text.contains("did you mean `radius`?")));
-    // An image that is none: only reading it tells.
+    // A file that is not an image: only reading it shows that.
     editor.dir.write("bricks.png", "no image");
     editor.change(TEXT);
     let uri = editor.uri.clone();
@@ -158,7 +158,7 @@ fn mistakes_are_shown_while_typing_and_those_of_files_after_a_save() {
 }
 
 #[test]
-fn keys_words_and_names_are_offered() {
+fn completions_offer_keys_choices_and_names() {
     let mut editor = Editor::open(TEXT);
     let (keys, first) = editor.offered(&TEXT.replace("radius = 0.5", "r|"));
     assert_eq!(
@@ -176,7 +176,7 @@ fn keys_words_and_names_are_offered() {
     assert_eq!(editor.offered(&TEXT.replace("\"bricks\" }", "| }")).1, "\"bricks\"");
     let (heads, _) = editor.offered(&format!("{TEXT}\n[ren|"));
     assert!(heads.contains(&"[render]".to_owned()) && !heads.contains(&"[camera]".to_owned()), "{heads:?}");
-    // A header takes the place of what is typed of it, with brackets that the editor has closed.
+    // A header completion replaces the typed part, including brackets that the editor has closed.
     for (typed, label) in [("[ren|", "[render]"), ("[|]", "[render]"), ("[[sp|]]", "[[sphere]]")] {
         let items = editor.at("textDocument/completion", &format!("{TEXT}\n{typed}"));
         let items = items.as_array().expect("candidates");
@@ -195,7 +195,7 @@ fn keys_words_and_names_are_offered() {
 }
 
 #[test]
-fn hovering_explains_and_definitions_are_found() {
+fn hover_explains_and_definitions_resolve() {
     let mut editor = Editor::open(TEXT);
     let hover = editor.at("textDocument/hover", &TEXT.replace("roughness", "rough|ness"));
     let text = hover["contents"]["value"].as_str().expect("a text");
@@ -212,7 +212,7 @@ fn hovering_explains_and_definitions_are_found() {
 }
 
 #[test]
-fn colours_are_shown_in_srgb_and_written_linear() {
+fn colors_are_shown_in_srgb_and_written_linear() {
     let text =
         TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\"\n[[light]]\nintensity = \"#+12345\"");
     let mut editor = Editor::open(&text);
@@ -234,7 +234,7 @@ fn colours_are_shown_in_srgb_and_written_linear() {
 }
 
 #[test]
-fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
+fn server_ends_on_exit_and_on_closed_stdin() {
     let mut editor = Editor::open(TEXT);
     assert_eq!(editor.ask("shutdown", &Value::Null), Value::Null);
     editor.tell("exit", &Value::Null);
@@ -251,7 +251,7 @@ fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
     assert_eq!(unknown["error"]["code"], -32601);
 }
 
-/// Sends bytes to a new server; returns its exit code, its answers and its stderr.
+/// Sends bytes to a new server; returns its exit code, its replies and its stderr.
 fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
     let dir = TestDir::new();
     let mut process = dir.glimt("lsp");
@@ -276,7 +276,7 @@ const SHUTDOWN: &str = r#"{"jsonrpc":"2.0","id":2,"method":"shutdown"}"#;
 const HOVER: &str = r#"{"jsonrpc":"2.0","id":3,"method":"textDocument/hover","params":{}}"#;
 
 #[test]
-fn the_server_answers_what_is_no_message_and_goes_on() {
+fn server_replies_to_malformed_messages() {
     let (code, said, _) =
         answers(&[INITIALIZE, "{no json", r#"{"jsonrpc":"2.0","id":"x"}"#, HOVER, SHUTDOWN, EXIT]);
     assert_eq!(code, Some(0), "{said}");
@@ -286,7 +286,7 @@ fn the_server_answers_what_is_no_message_and_goes_on() {
 }
 
 #[test]
-fn the_server_waits_for_its_exit_and_says_how_it_came() {
+fn server_exit_code_depends_on_shutdown() {
     let (code, said, _) = answers(&[INITIALIZE, SHUTDOWN, HOVER, EXIT]);
     assert!(code == Some(0) && said.contains("-32600") && said.contains(r#""id":3"#), "{said}");
     assert_eq!(answers(&[INITIALIZE, EXIT]).0, Some(1), "exit without shutdown");
@@ -294,13 +294,13 @@ fn the_server_waits_for_its_exit_and_says_how_it_came() {
 }
 
 #[test]
-fn a_length_beyond_all_scenes_is_an_error() {
+fn excessive_content_length_is_an_error() {
     let (code, _, said) = answers(&[INITIALIZE, "Content-Length: 1000000000000\r\n\r\n{}"]);
     assert!(code == Some(1) && said.contains("1000000000000 bytes") && said.lines().count() == 1, "{said}");
 }
 
 #[test]
-fn texts_that_are_half_there_and_edits_of_ranges_end_nothing() {
+fn partial_texts_and_range_edits_are_survived() {
     let mut editor = Editor::open(TEXT);
     // A surrogate without its partner stands for a character.
     let document = json!({ "uri": editor.uri, "version": 2 });
@@ -312,7 +312,7 @@ fn texts_that_are_half_there_and_edits_of_ranges_end_nothing() {
     editor.mistakes(|list| {
         list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains('x')))
     });
-    // A NUL makes it a binary file, as for `glimt check`, and nothing else.
+    // A NUL makes it a binary file, as for `glimt check`, with no other error.
     editor.change("a\0b = = 1\n");
     let list = editor.mistakes(|list| {
         list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains("binary")))

@@ -1,4 +1,4 @@
-//! The program as a whole: one crate, so that it links once.
+//! Tests of the program as a whole, in one crate so that it links only once.
 
 mod architecture;
 mod bench;
@@ -10,9 +10,9 @@ mod checkpoints;
 mod closed_forms;
 mod compare;
 mod contract;
-mod test_dir;
 mod docs;
 mod extremes;
+mod fuzz;
 mod gltf;
 mod hostile;
 mod info;
@@ -24,7 +24,6 @@ mod layers;
 mod library;
 mod lsp;
 mod models;
-mod fuzz;
 #[cfg(target_os = "linux")]
 mod niceness;
 mod noise;
@@ -38,5 +37,6 @@ mod shell;
 mod shown;
 mod stress;
 mod terminal;
+mod test_dir;
 mod turntable;
 mod views;

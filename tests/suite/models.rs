@@ -1,11 +1,11 @@
-//! Models in files of every format, with their own materials.
+//! Models in every file format, with their own materials.
 
 use super::test_dir::TestDir;
 
 const CAMERA: &str = "[render]\nwidth = 24\nheight = 18\nsamples = 4\n[camera]\nposition = [0.3, 0.4, 3]\nlook_at = [0.5, 0.4, 0]\n\
                       [[light]]\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n[environment]\ncolor = [0.3, 0.4, 0.5]\n";
 
-/// The linear values of a scene's picture.
+/// The linear values of a scene's image.
 fn picture(dir: &TestDir, scene: &str) -> Vec<f32> {
     dir.write("scene.toml", format!("{CAMERA}{scene}"));
     dir.expect("scene.toml --once -o scene.exr", 0);
@@ -13,7 +13,7 @@ fn picture(dir: &TestDir, scene: &str) -> Vec<f32> {
 }
 
 #[test]
-fn one_tetrahedron_is_one_picture_in_every_format() {
+fn tetrahedron_looks_the_same_in_every_format() {
     let dir = TestDir::new();
     let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
@@ -38,7 +38,7 @@ fn one_tetrahedron_is_one_picture_in_every_format() {
         format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
     };
     dir.write("a.stl", format!("solid a\n{}endsolid a\n", places.map(facet).concat()));
-    let mut bytes = [&b"solid is how many begin"[..], &[0; 57], &4_u32.to_le_bytes()].concat();
+    let mut bytes = [&b"solid is how many binary files begin"[..], &[0; 57], &4_u32.to_le_bytes()].concat();
     for place in places {
         bytes.extend([0; 12]);
         bytes.extend(place.as_flattened().iter().flat_map(|number| (*number as f32).to_le_bytes()));
@@ -60,7 +60,7 @@ fn one_tetrahedron_is_one_picture_in_every_format() {
 }
 
 #[test]
-fn the_physical_extension_of_mtl_is_the_principled_material() {
+fn physical_mtl_equals_the_principled_material() {
     let dir = TestDir::new();
     dir.write("dull.ppm", "P3 2 2 255 20 20 20 90 90 90 160 160 160 230 230 230\n");
     dir.write("skin.ppm", "P3 2 1 255 250 120 60 40 90 230\n");
@@ -87,7 +87,7 @@ fn the_physical_extension_of_mtl_is_the_principled_material() {
             "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\nopacity = 0.25\n",
         ),
         ("Kd 0.8 0.4 0.2\nPr 0.3\nTr 0.25\n", "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nopacity = 0.75\n"),
-        // A mask makes no glass.
+        // A mask is not glass.
         (
             "Kd 0.8 0.4 0.2\nPr 0.3\nKe 2 1 0.5\nillum 9\nd 0.5\nmap_d dull.ppm\n",
             "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\nopacity = { texture = \"dull\" }\n",
@@ -108,9 +108,9 @@ fn the_physical_extension_of_mtl_is_the_principled_material() {
     }
 }
 
-/// MeshLab and others count `Tr` the other way round: 1 is opaque there, as is 0 for the rest.
+/// MeshLab and others invert `Tr`: 1 is opaque for them, while 0 is opaque for all others.
 #[test]
-fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() {
+fn misused_mtl_statements_are_corrected() {
     let dir = TestDir::new();
     dir.write("shine.ppm", "P3 1 1 255 255 255 255\n");
     dir.write(
@@ -136,7 +136,7 @@ fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() 
         ("Ks 0.8 0.8 0.8\nTr 1\n", Some(opaque)),
         ("map_Ks shine.ppm\n", Some(dull)),
         ("Ks 0 0 0\nNs 0\n", None),
-        // Model 1 has no highlight.
+        // Illumination model 1 has no highlight.
         ("Ks 0.8 0.8 0.8\nNs 0\nillum 1\n", None),
     ] {
         let (picture, said) = said(&format!("Kd 0.8 0.8 0.8\n{mtl}"));
@@ -146,11 +146,11 @@ fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() 
             None => assert!(!said.contains("warning"), "{mtl}: {said}"),
         }
     }
-    assert!(said("Kd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 20\n").0 != plain, "a highlight is seen");
+    assert!(said("Kd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 20\n").0 != plain, "a highlight is visible");
 }
 
 #[test]
-fn a_direction_that_a_mesh_has_not_is_a_warning() {
+fn anisotropy_without_uv_warns() {
     let dir = TestDir::new();
     dir.write("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
     let scene = |anisotropy: &str| {
@@ -170,7 +170,7 @@ fn a_direction_that_a_mesh_has_not_is_a_warning() {
 }
 
 #[test]
-fn pictures_of_a_material_file_are_named_with_their_material() {
+fn missing_mtl_images_name_their_material() {
     let dir = TestDir::new();
     dir.write(
         "a.obj",
@@ -197,7 +197,7 @@ fn pictures_of_a_material_file_are_named_with_their_material() {
 }
 
 #[test]
-fn images_that_cannot_be_what_a_material_takes_them_for_are_named() {
+fn unsuitable_images_warn() {
     let dir = TestDir::new();
     dir.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
     let said = |material: &str| {
@@ -224,7 +224,7 @@ fn images_that_cannot_be_what_a_material_takes_them_for_are_named() {
 }
 
 #[test]
-fn keys_that_change_nothing_on_a_mesh_are_warned_of() {
+fn ineffective_mesh_keys_warn() {
     let dir = TestDir::new();
     let corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n";
     dir.write("a.off", format!("COFF\n3 1 0\n{corners}3 0 1 2\n"));

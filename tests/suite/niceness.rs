@@ -5,19 +5,19 @@ use std::io::{BufRead, BufReader};
 use std::process::{Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use super::test_dir::{TestDir, SCENE};
+use super::test_dir::{SCENE, TestDir};
 
-/// Longest time to wait for anything, on however busy a machine.
+/// Time limit for any wait, however busy the machine is.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// Name and nice value of a thread, by its line in /proc.
+/// Name and nice value of a thread, from its line in /proc.
 fn of_thread(stat: &str) -> Option<(String, i32)> {
     let (name, after) = stat.split_once('(')?.1.rsplit_once(')')?;
-    // The state, which stands behind the name, is the third of the fields; the nice value is the 19th.
+    // The state, right after the name, is the third field; the nice value is the 19th.
     Some((name.to_owned(), after.split_whitespace().nth(16)?.parse().ok()?))
 }
 
-/// The nice value that programs get from this one.
+/// The nice value that programs inherit from this one.
 fn own() -> i32 {
     let stat = fs::read_to_string("/proc/thread-self/stat").expect("of this thread");
     of_thread(&stat).expect("a nice value").1
@@ -40,7 +40,7 @@ pub(crate) fn of_render_threads(id: u32) -> Vec<i32> {
         .collect()
 }
 
-/// The different nice values of two or more working render threads, in a program that prints `sign` to stderr once it
+/// The distinct nice values of two or more active render threads, in a program that prints `sign` to stderr once it
 /// renders.
 fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
     let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
@@ -65,9 +65,9 @@ fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
 }
 
 #[test]
-fn once_and_bench_give_way_to_nobody_unless_they_are_asked_to() {
+fn once_and_bench_are_not_nice_by_default() {
     let dir = TestDir::new();
-    // As many samples as it never gets to.
+    // More samples than it will ever render.
     dir.write("long.toml", SCENE.replace("samples = 2", "samples = 4000000000"));
     let calls = [
         ("long.toml --once --threads 2 --progress json", "\"event\":\"progress\""),

@@ -1,4 +1,4 @@
-//! Noise: whether the error that is reported, written and requested is the true one, by the spread of many seeds.
+//! Noise: whether the reported, stored and requested error is the true one, from the spread over many seeds.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use super::test_dir::TestDir;
 
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Columns and rows of the pictures: whole tiles.
+/// Columns and rows of the images: whole tiles.
 const SIZE: [usize; 2] = [64, 32];
 
 const HEAD: &str = r#"[render]
@@ -42,7 +42,7 @@ radius = 0.4
 material = "lamp"
 "#;
 
-/// A caustic on the floor, which paths seldom find; ball and lamp are out of the picture.
+/// A caustic on the floor, which paths rarely find; ball and light are outside the image.
 const CAUSTIC: &str = r#"
 [materials]
 wall = { diffuse = [0.7, 0.7, 0.7] }
@@ -60,7 +60,7 @@ radius = 0.2
 material = "lamp"
 "#;
 
-/// A ball of a material, with what is around it.
+/// A ball of a material, with its surroundings.
 fn ball(around: &str, shininess: u32) -> String {
     format!(
         r#"{HEAD}{around}
@@ -81,7 +81,7 @@ fn dir(scene: &str) -> TestDir {
     dir
 }
 
-/// The luminances of a picture and the error in its report.
+/// The luminances of an image and the error in its report.
 fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
     let output = dir.run(&format!("scene.toml --once --progress none -o a.exr --report a.json {options}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -96,7 +96,7 @@ fn render(dir: &TestDir, options: &str) -> (Vec<f64>, f64) {
     )
 }
 
-/// Pictures of some seeds: the mean and the variance of each pixel, and the root mean square of the reported errors.
+/// Images for several seeds: the mean and the variance of each pixel, and the root mean square of the reported errors.
 struct Seeds {
     means: Vec<f64>,
     variances: Vec<f64>,
@@ -105,8 +105,7 @@ struct Seeds {
 
 impl Seeds {
     fn of(dir: &TestDir, count: u32, options: &str) -> Self {
-        let runs: Vec<_> =
-            (1..=count).map(|seed| render(dir, &format!("--seed {seed} {options}"))).collect();
+        let runs: Vec<_> = (1..=count).map(|seed| render(dir, &format!("--seed {seed} {options}"))).collect();
         let count = f64::from(count);
         let pixels = 0..runs[0].0.len();
         let means: Vec<f64> = pixels
@@ -129,7 +128,7 @@ impl Seeds {
         self.variances.iter().sum::<f64>() / self.variances.len() as f64
     }
 
-    /// The true relative error of the picture.
+    /// The true relative error of the image.
     fn error(&self) -> f64 {
         self.variance().sqrt() / self.mean()
     }
@@ -146,7 +145,7 @@ impl Seeds {
 }
 
 #[test]
-fn the_error_of_the_report_is_the_true_one() {
+fn reported_error_is_the_true_error() {
     for (name, scene) in [("penumbra", PENUMBRA), ("caustic", CAUSTIC)] {
         let dir = dir(&format!("{HEAD}{scene}"));
         for samples in [16, 64] {
@@ -158,19 +157,19 @@ fn the_error_of_the_report_is_the_true_one() {
 }
 
 #[test]
-fn tiles_that_stop_by_their_noise_have_no_more_than_was_asked() {
+fn stopped_tiles_reach_the_noise_target() {
     for (name, scene, error) in [("penumbra", PENUMBRA, 0.05), ("caustic", CAUSTIC, 0.4)] {
         let dir = dir(&format!("{HEAD}{scene}"));
         let seeds = Seeds::of(&dir, 24, &format!("--integrator path --samples 4096 --error {error}"));
         let tiles = seeds.tiles();
         let parts =
             (tiles.iter().map(|tile| (tile / error).powi(2)).sum::<f64>() / tiles.len() as f64).sqrt();
-        assert!((0.5..1.1).contains(&parts), "{name}: {parts} of what was asked");
+        assert!((0.5..1.1).contains(&parts), "{name}: {parts} of the target");
     }
 }
 
 #[test]
-fn glossy_surfaces_under_a_sky_are_about_as_quiet_by_whitted_as_by_paths() {
+fn whitted_glossy_noise_matches_path() {
     const WIDE_SUN: &str =
         "[[light]]\ntype = \"directional\"\ndirection = [-0.3, -0.4, -1]\nirradiance = [3, 3, 3]\nangle = 60";
     let skies = ["[environment]\ncolor = [1, 1, 1]", "[environment]\nfile = \"sky.ppm\"", WIDE_SUN];
@@ -189,7 +188,7 @@ fn glossy_surfaces_under_a_sky_are_about_as_quiet_by_whitted_as_by_paths() {
 }
 
 #[test]
-fn a_filter_with_negative_lobes_leaves_dark_noise_as_bright_as_it_is() {
+fn negative_lobes_keep_the_mean_of_dark_noise() {
     let dir = dir(&format!("{HEAD}{CAUSTIC}"));
     let of = |filter: &str| {
         let scene =
@@ -203,5 +202,5 @@ fn a_filter_with_negative_lobes_leaves_dark_noise_as_bright_as_it_is() {
     let difference = mitchell.mean() - plain.mean();
     assert!(difference.abs() < 3.0 * error, "{difference} ± {error} of {}", plain.mean());
     let (picture, _) = render(&dir, "--integrator path --samples 8 --set render.filter=mitchell");
-    assert!(picture.iter().any(|luminance| *luminance < 0.0), "the file keeps what is negative");
+    assert!(picture.iter().any(|luminance| *luminance < 0.0), "the file keeps negative values");
 }

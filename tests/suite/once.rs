@@ -4,10 +4,10 @@ use std::fs;
 use std::process::{Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use super::test_dir::{TestDir, SCENE};
+use super::test_dir::{SCENE, TestDir};
 
 #[test]
-fn a_scene_is_rendered_and_named_at_the_end() {
+fn once_renders_and_names_the_image() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once", 0);
     let last = stderr.lines().last().expect("a line");
@@ -19,7 +19,7 @@ fn a_scene_is_rendered_and_named_at_the_end() {
 }
 
 #[test]
-fn an_output_of_the_scene_lies_beside_it_and_one_of_the_call_in_the_working_directory() {
+fn outputs_resolve_to_scene_or_working_directory() {
     let dir = TestDir::new();
     fs::create_dir_all(dir.path("scenes/out")).expect("a folder");
     dir.write("scenes/own.toml", SCENE.replace("[render]", "[render]\noutput = \"out/own.ppm\""));
@@ -35,7 +35,7 @@ fn an_output_of_the_scene_lies_beside_it_and_one_of_the_call_in_the_working_dire
 }
 
 #[test]
-fn several_outputs_and_no_progress() {
+fn once_writes_several_outputs_silently() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once -o a.png -o b.ppm --progress none", 0);
     assert_eq!(stderr, "");
@@ -44,7 +44,7 @@ fn several_outputs_and_no_progress() {
 }
 
 #[test]
-fn json_lines_have_the_keys_that_are_documented() {
+fn json_progress_has_the_documented_keys() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once --progress json", 0);
     let lines: Vec<serde_json::Value> =
@@ -63,7 +63,7 @@ fn json_lines_have_the_keys_that_are_documented() {
 }
 
 #[test]
-fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
+fn json_progress_contains_the_errors() {
     let dir = TestDir::new();
     dir.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = dir.expect("ball.toml --once --progress json", 2);
@@ -78,7 +78,7 @@ fn json_lines_hold_the_errors_and_nothing_is_mixed_with_them() {
 }
 
 #[test]
-fn the_report_has_its_keys() {
+fn report_values_match_the_call() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --report r.json --seed 5 --threads 2 --samples 3", 0);
     let text = fs::read_to_string(dir.path("r.json")).expect("a report");
@@ -115,7 +115,7 @@ fn the_report_has_its_keys() {
     assert!(report["peak_memory_bytes"].as_u64().expect("bytes") > 1 << 20);
 }
 
-/// The keys that scripts rely on, with a value of the type of each.
+/// The keys that scripts rely on, each with a value of its type.
 const REPORT: &str = r#"{
   "glimt": "0.1.0",
   "scene": "scenes/cornell.toml",
@@ -129,7 +129,7 @@ const REPORT: &str = r#"{
   "peak_memory_bytes": 41943040
 }"#;
 
-/// Whether `found` has every key of `example`, with a value of its type; whole numbers stay whole.
+/// Checks that `found` has every key of `example` with a value of its type; integers stay integers.
 fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &str) {
     use serde_json::Value as V;
     match (example, found) {
@@ -151,20 +151,20 @@ fn assert_like(example: &serde_json::Value, found: &serde_json::Value, place: &s
 }
 
 #[test]
-fn the_report_has_every_key_with_its_type() {
+fn report_has_every_key_with_its_type() {
     let dir = TestDir::new();
     let example: serde_json::Value = serde_json::from_str(REPORT).expect("JSON");
     let report = dir.report("ball.toml --samples 3");
     assert_like(&example, &report, "report");
     let error =
         |samples: u32| dir.report(&format!("ball.toml --samples {samples}"))["image"]["error"].clone();
-    assert!(error(1).is_null(), "one sample tells nothing of its error");
+    assert!(error(1).is_null(), "one sample has no error estimate");
     let [few, many] = [4, 256].map(|samples| error(samples).as_f64().expect("an estimate"));
     assert!(many > 0.0 && many < 0.25 * few && few < 1.0, "{few} {many}");
 }
 
 #[test]
-fn a_wrong_scene_is_2_and_leaves_the_picture() {
+fn broken_scene_exits_2_and_keeps_the_image() {
     let dir = TestDir::new();
     dir.write("ball.png", "the old one");
     dir.write("ball.toml", SCENE.replace("width = 32", "width = = 32"));
@@ -176,7 +176,7 @@ fn a_wrong_scene_is_2_and_leaves_the_picture() {
 }
 
 #[test]
-fn a_mesh_that_is_not_there_is_2_and_named() {
+fn missing_mesh_exits_2() {
     let dir = TestDir::new();
     dir.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"no.obj\"\nmaterial = \"ball\"\n"));
     let stderr = dir.expect("ball.toml --once", 2);
@@ -185,7 +185,7 @@ fn a_mesh_that_is_not_there_is_2_and_named() {
 }
 
 #[test]
-fn what_is_wrong_with_the_call_is_not_said_of_the_scene() {
+fn call_errors_do_not_point_into_the_scene() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
     assert!(stderr.starts_with("error: --crop 0,0,33,1") && !stderr.contains("-->"), "{stderr}");
@@ -198,7 +198,7 @@ fn what_is_wrong_with_the_call_is_not_said_of_the_scene() {
 }
 
 #[test]
-fn options_that_change_nothing_are_told() {
+fn ineffective_options_warn() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once --dof on --photons on --integrator path --progress none", 0);
     let warning = "warning: --dof on has no effect: the scene's camera is a pinhole";
@@ -215,7 +215,7 @@ fn options_that_change_nothing_are_told() {
 }
 
 #[test]
-fn a_generated_mesh_that_is_not_there_is_told_with_its_maker() {
+fn missing_generated_mesh_names_its_command() {
     let dir = TestDir::new();
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/million.toml");
     dir.write("million.toml", fs::read_to_string(scene).expect("a scene"));
@@ -224,7 +224,7 @@ fn a_generated_mesh_that_is_not_there_is_told_with_its_maker() {
 }
 
 #[test]
-fn a_wrong_call_is_2() {
+fn wrong_call_exits_2() {
     let dir = TestDir::new();
     for (line, word) in [
         ("ball.toml --once --samples 0", "--samples"),
@@ -244,7 +244,7 @@ fn a_wrong_call_is_2() {
 }
 
 #[test]
-fn a_file_that_cannot_be_written_is_1() {
+fn write_failure_exits_1() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once -o nowhere/a.png", 1);
     assert!(stderr.contains("nowhere"), "{stderr}");
@@ -253,7 +253,7 @@ fn a_file_that_cannot_be_written_is_1() {
 }
 
 #[test]
-fn each_output_that_cannot_be_written_has_a_line() {
+fn each_failed_output_has_a_line() {
     let dir = TestDir::new();
     for name in ["a.png", "b.ppm"] {
         std::os::unix::fs::symlink("/dev/full", dir.path(name)).expect("a link");
@@ -267,7 +267,7 @@ fn each_output_that_cannot_be_written_has_a_line() {
 }
 
 #[test]
-fn a_command_that_is_said_can_be_pasted() {
+fn suggested_command_can_be_pasted() {
     let dir = TestDir::new();
     let name = "it's my \"scene\" $HOME.toml";
     let output = dir.glimt("new").arg(name).output().expect("it runs");
@@ -279,7 +279,7 @@ fn a_command_that_is_said_can_be_pasted() {
 }
 
 #[test]
-fn help_and_version_are_answers() {
+fn help_and_version_go_to_stdout() {
     let dir = TestDir::new();
     for (line, word) in
         [("--help", "--samples"), ("--version", glimt::pipeline::BUILD), ("new --help", "FILE")]
@@ -291,7 +291,7 @@ fn help_and_version_are_answers() {
 }
 
 #[test]
-fn check_says_what_there_is() {
+fn check_counts_objects_and_triangles() {
     let dir = TestDir::new();
     let output = dir.run("check ball.toml");
     assert_eq!(output.status.code(), Some(0));
@@ -303,7 +303,7 @@ fn check_says_what_there_is() {
 }
 
 #[test]
-fn check_warns_of_meshes_in_the_dark() {
+fn check_warns_about_unlit_meshes() {
     let dir = TestDir::new();
     dir.write("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
     dir.write("a.mtl", "newmtl a\nKd 1 1 1\n");
@@ -316,7 +316,7 @@ fn check_warns_of_meshes_in_the_dark() {
 }
 
 #[test]
-fn a_scene_of_very_many_shapes_is_checked() {
+fn check_handles_200000_shapes() {
     use std::fmt::Write;
     const COUNT: u32 = 200_000;
     let dir = TestDir::new();
@@ -333,7 +333,7 @@ fn a_scene_of_very_many_shapes_is_checked() {
 }
 
 #[test]
-fn new_writes_a_scene_that_renders_and_never_overwrites() {
+fn new_scene_renders_and_never_overwrites() {
     let dir = TestDir::new();
     let stderr = dir.expect("new fresh.toml", 0);
     assert!(stderr.contains("glimt fresh.toml"), "{stderr}");
@@ -342,7 +342,7 @@ fn new_writes_a_scene_that_renders_and_never_overwrites() {
     assert!(stderr.contains("ball.toml exists"), "{stderr}");
     assert_eq!(fs::read_to_string(dir.path("ball.toml")).expect("there"), SCENE);
     dir.expect("new nowhere/x.toml", 1);
-    // A folder of that name is there already, however it is written.
+    // A folder with that name exists, however the path is written.
     fs::create_dir(dir.path("sub")).expect("a folder");
     for name in ["sub", "sub/"] {
         let stderr = dir.expect(&format!("new {name}"), 2);
@@ -351,7 +351,7 @@ fn new_writes_a_scene_that_renders_and_never_overwrites() {
 }
 
 #[test]
-fn a_name_that_no_command_line_shows_is_in_no_advice() {
+fn unprintable_names_are_not_suggested() {
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt;
     let dir = TestDir::new();
@@ -368,7 +368,7 @@ fn a_name_that_no_command_line_shows_is_in_no_advice() {
     }
 }
 
-/// Starts a render, and sends it so many signals once it writes its picture. Returns its exit code and what it said.
+/// Starts a render, sends it `signals` signals once it writes its image, and returns its exit code and stderr.
 fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>, String) {
     let stderr = fs::File::create(dir.path("stderr")).expect("a file");
     let mut child = dir.glimt(line).stderr(stderr).spawn().expect("it runs");
@@ -376,11 +376,11 @@ fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>
     let start = Instant::now();
     let is_writing = || said().lines().any(|line| line.contains("\"write\"") && line.contains("running"));
     while !is_writing() {
-        assert!(start.elapsed() < Duration::from_secs(60), "it does not begin to write: {}", said());
+        assert!(start.elapsed() < Duration::from_secs(60), "it does not start to write: {}", said());
         std::thread::sleep(Duration::from_millis(1));
     }
     for _ in 0..signals {
-        // It may have come to its end.
+        // The process may have ended.
         let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
         std::thread::sleep(Duration::from_millis(30));
     }
@@ -389,8 +389,9 @@ fn ended_in_the_write(dir: &TestDir, line: &str, signals: usize) -> (Option<i32>
 }
 
 #[test]
-fn a_finished_render_is_not_lost_to_a_signal_while_its_picture_is_written() {
-    // One signal leaves time to a picture that is written soon, a second one ends the write. Either way the samples are there.
+fn signal_during_the_write_keeps_the_render() {
+    // One signal leaves time for an image that is almost written, a second one aborts the write. Either way the samples
+    // are saved.
     for (size, signals) in [("--width 700 --height 500", 1), ("--width 1600 --height 1200", 2)] {
         let dir = TestDir::new();
         let render = format!("ball.toml --once -o out.png --samples 1 --progress json {size}");
@@ -411,7 +412,7 @@ fn a_finished_render_is_not_lost_to_a_signal_while_its_picture_is_written() {
 }
 
 #[test]
-fn a_signal_in_the_write_says_that_the_picture_is_written() {
+fn signal_during_the_write_reports_the_image() {
     let dir = TestDir::new();
     let stderr = fs::File::create(dir.path("stderr")).expect("a file");
     let line =
@@ -425,14 +426,14 @@ fn a_signal_in_the_write_says_that_the_picture_is_written() {
     }
     let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
     let code = child.wait().expect("it ends").code();
-    // Without checkpoints nothing else keeps the samples.
+    // Without checkpoints nothing else saves the samples.
     assert!(dir.path("out.png").exists(), "{code:?}: {}", said());
     assert!(said().contains("wrote out.png"), "{}", said());
     assert!(code == Some(0) || said().ends_with("ended by SIGTERM: the picture was written\n"), "{}", said());
 }
 
 #[test]
-fn the_picture_does_not_depend_on_threads() {
+fn image_does_not_depend_on_threads() {
     let dir = TestDir::new();
     for threads in [1, 2, 7] {
         dir.expect(&format!("ball.toml --once -o {threads}.ppm --samples 5 --threads {threads}"), 0);
@@ -442,7 +443,7 @@ fn the_picture_does_not_depend_on_threads() {
 }
 
 #[test]
-fn a_closed_pipe_is_no_panic() {
+fn closed_pipe_does_not_panic() {
     let dir = TestDir::new();
     let mut child = dir.glimt("ball.toml --once").stderr(Stdio::piped()).spawn().expect("it runs");
     drop(child.stderr.take());
@@ -453,7 +454,7 @@ fn a_closed_pipe_is_no_panic() {
 }
 
 #[test]
-fn signals_end_it_with_their_code_and_leave_the_picture() {
+fn signals_set_the_exit_code_and_keep_the_image() {
     for (name, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
         let dir = TestDir::new();
         dir.write("ball.png", "the old one");
@@ -462,7 +463,7 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
             .stderr(Stdio::piped())
             .spawn()
             .expect("it runs");
-        // Without a sample there is nothing to keep.
+        // Without a sample there is nothing to save.
         wait_for(&mut child, |line| line.contains("\"progress\"") && !line.contains("\"samples\":0,"));
         let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
         assert!(killed.expect("kill runs").success());
@@ -474,7 +475,7 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
 }
 
 #[test]
-fn an_end_by_a_signal_is_said() {
+fn signal_is_reported() {
     for (name, code, words) in [
         (
             "INT",
@@ -497,11 +498,11 @@ fn an_end_by_a_signal_is_said() {
                 .spawn()
                 .expect("it runs");
             let said = || fs::read_to_string(dir.path("stderr")).expect("there");
-            // Silent progress gives no sign that the handlers are installed.
+            // Silent progress does not show when the handlers are installed.
             let sign = if progress == "plain" { "photons" } else { "" };
             let start = Instant::now();
             while !said().contains(sign) || start.elapsed() < Duration::from_millis(500) {
-                assert!(start.elapsed() < Duration::from_secs(30), "it does not begin");
+                assert!(start.elapsed() < Duration::from_secs(30), "it does not start");
                 std::thread::sleep(Duration::from_millis(10));
             }
             let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
@@ -515,7 +516,7 @@ fn an_end_by_a_signal_is_said() {
 }
 
 #[test]
-fn new_writes_to_stdout_where_the_file_is_a_dash() {
+fn new_writes_to_stdout_for_a_dash() {
     let dir = TestDir::new();
     let output = dir.run("new -");
     assert_eq!(output.status.code(), Some(0));
@@ -524,7 +525,7 @@ fn new_writes_to_stdout_where_the_file_is_a_dash() {
     assert!(!dir.path("-").exists());
     dir.expect("new ./-", 0);
     assert_eq!(dir.bytes("-"), glimt::scene::starter().as_bytes());
-    // A scene on stdout has no place beside it: whoever asked for a schema there hears how to get it.
+    // A scene on stdout has no folder for a schema: the message says how to get it.
     let output = dir.run("new --schema -");
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
@@ -533,7 +534,7 @@ fn new_writes_to_stdout_where_the_file_is_a_dash() {
     assert_eq!(said, words);
 }
 
-/// Waits until the process prints such a line to stderr; later output is read and dropped.
+/// Waits until the process prints such a line to stderr; later output is read and discarded.
 fn wait_for(child: &mut std::process::Child, is_it: impl Fn(&str) -> bool + Send + 'static) {
     use std::io::{BufRead, BufReader};
     let stderr = BufReader::new(child.stderr.take().expect("piped"));

@@ -1,4 +1,4 @@
-//! Each option changes its own part and nothing else, and the report says so.
+//! Each option changes only its own part of the image, and the report says so.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -10,9 +10,9 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use super::test_dir::{TestDir, SCENE};
+use super::test_dir::{SCENE, TestDir};
 
-/// A lamp with an extent, a mirror, a lens: something for every option.
+/// An area light, a mirror, a lens: something for every option to change.
 const ROOM: &str = r#"[render]
 width = 24
 height = 18
@@ -68,20 +68,20 @@ fn room() -> TestDir {
     dir
 }
 
-/// The bytes of the picture with these options.
+/// The bytes of the image with these options.
 #[track_caller]
 fn picture(dir: &TestDir, options: &str) -> Vec<u8> {
     dir.expect(&format!("room.toml --once -o picture.ppm --progress none {options}"), 0);
     dir.bytes("picture.ppm")
 }
 
-/// The pixels of a PPM of 8 bits.
+/// The pixels of an 8-bit PPM.
 fn pixels(ppm: &[u8], count: usize) -> &[u8] {
     &ppm[ppm.len() - 3 * count..]
 }
 
 #[test]
-fn each_option_changes_the_picture_and_is_told_by_the_report() {
+fn options_change_the_image_and_the_report() {
     let dir = room();
     let plain = picture(&dir, "");
     assert_eq!(plain, picture(&dir, ""), "twice the same");
@@ -122,7 +122,7 @@ fn each_option_changes_the_picture_and_is_told_by_the_report() {
 }
 
 #[test]
-fn what_the_call_sets_is_rendered_as_if_the_file_said_it() {
+fn set_equals_an_edit_of_the_file() {
     let dir = room();
     let sets = "--set materials.ball.diffuse=[0.1,0.2,0.3] --set sphere.2.radius=.4 --set render.samples=3";
     let by_call = picture(&dir, sets);
@@ -132,7 +132,7 @@ fn what_the_call_sets_is_rendered_as_if_the_file_said_it() {
     assert_eq!(by_call, picture(&dir, ""));
     dir.write("room.toml", ROOM);
     assert_ne!(by_call, picture(&dir, ""));
-    // Options come after it.
+    // Options take precedence.
     assert_eq!(picture(&dir, "--set render.samples=5 --samples 2"), picture(&dir, ""));
     let checked = dir.run("check room.toml --set materials.ball.diffuse=tomatoe");
     let words = String::from_utf8(checked.stderr).expect("UTF-8");
@@ -141,7 +141,7 @@ fn what_the_call_sets_is_rendered_as_if_the_file_said_it() {
 }
 
 #[test]
-fn depth_decides_which_rays_there_are() {
+fn depth_limits_the_rays() {
     let dir = room();
     let counters = |depth: u32| dir.report(&format!("room.toml --max-depth {depth}"))["counters"].clone();
     let (none, direct, deep) = (counters(0), counters(1), counters(8));
@@ -171,7 +171,7 @@ fn size_samples_and_time() {
 }
 
 #[test]
-fn a_crop_has_the_pixels_of_the_whole_and_black_around() {
+fn crop_keeps_its_pixels_and_is_black_outside() {
     let dir = room();
     let whole = picture(&dir, "");
     let cut = picture(&dir, "--crop 5,4,10,8");
@@ -185,7 +185,7 @@ fn a_crop_has_the_pixels_of_the_whole_and_black_around() {
 }
 
 #[test]
-fn every_format_at_once_and_depth_of_bits() {
+fn formats_and_bit_depths_agree() {
     let dir = room();
     let report = dir.report("room.toml -o a.png -o a.exr -o a.ppm -o a.hdr -o a.jpg");
     assert_eq!(report["image"]["path"], "a.png");
@@ -207,7 +207,7 @@ fn every_format_at_once_and_depth_of_bits() {
 }
 
 #[test]
-fn wrong_values_are_answered_with_what_is_expected() {
+fn wrong_values_report_the_expected_ones() {
     let dir = TestDir::new();
     for (option, words) in [
         ("--samples abc", "expected a whole number from 1 to 4294967295"),
@@ -255,7 +255,7 @@ fn wrong_values_are_answered_with_what_is_expected() {
 }
 
 #[test]
-fn targets_are_told_before_the_work() {
+fn targets_are_checked_before_rendering() {
     let dir = TestDir::new();
     std::os::unix::fs::symlink("/dev/full", dir.path("full.png")).expect("a link");
     let stderr = dir.expect("ball.toml --once -o full.png", 1);
@@ -290,7 +290,7 @@ fn names(dir: &TestDir) -> Vec<String> {
 }
 
 #[test]
-fn a_new_scene_is_named_like_one() {
+fn new_requires_a_scene_name() {
     let dir = TestDir::new();
     for (name, what) in [
         ("a.png", "a picture"),
@@ -310,7 +310,7 @@ fn a_new_scene_is_named_like_one() {
 }
 
 #[test]
-fn a_usage_error_keeps_its_lines_whatever_was_typed() {
+fn usage_errors_escape_line_breaks() {
     use std::os::unix::ffi::OsStrExt;
     let dir = TestDir::new();
     let mut process = dir.glimt("ball.toml --once --set");
@@ -323,7 +323,7 @@ fn a_usage_error_keeps_its_lines_whatever_was_typed() {
 }
 
 #[test]
-fn a_word_that_is_no_file_is_taken_for_a_command() {
+fn unknown_word_is_taken_for_a_command() {
     let dir = TestDir::new();
     for (call, words) in [
         (
@@ -338,11 +338,11 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         let stderr = dir.expect(call, 2);
         assert!(stderr.contains(words) && stderr.lines().count() == 1, "{call}: {stderr}");
     }
-    // A word that may be a file is one that does not exist.
+    // A word that may be a file is reported as a missing file.
     for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
         assert!(dir.expect(call, 2).contains("there is no such scene file"), "{call}");
     }
-    // Before the screen opens, too.
+    // The same before the screen opens.
     let stderr = dir.expect("bal.toml", 2);
     assert!(
         stderr.contains("there is no such scene file") && stderr.contains("did you mean ball.toml?"),
@@ -361,9 +361,9 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     dir.expect("paint --once -o a.png", 0);
 }
 
-/// Without a screen that waits for the file to become a scene.
+/// In a mode that does not wait for the file to become a scene.
 #[test]
-fn images_parts_and_checkpoints_are_refused_with_their_info() {
+fn images_parts_and_checkpoints_are_not_scenes() {
     let dir = TestDir::new();
     dir.write("ball.toml", SCENE);
     dir.expect("ball.toml --once -o a.png -o b.exr -o c.hdr -o d.jpg -o e.webp -o f.ppm", 0);
@@ -391,10 +391,10 @@ fn images_parts_and_checkpoints_are_refused_with_their_info() {
     assert!(json.lines().all(|line| line.starts_with('{')) && json.contains("an image (PNG)"), "{json}");
 }
 
-/// Checks the way out in the message: the stacks of so many threads take more than the limit.
+/// Checks the suggestion in the message: the stacks of so many threads exceed the limit.
 #[cfg(target_os = "linux")]
 #[test]
-fn threads_that_do_not_start_are_said_with_the_way_out() {
+fn failed_threads_suggest_a_remedy() {
     let dir = TestDir::new();
     let glimt = dir.glimt("");
     let mut shell = std::process::Command::new("sh");
@@ -408,7 +408,7 @@ fn threads_that_do_not_start_are_said_with_the_way_out() {
 }
 
 #[test]
-fn a_dash_is_standard_output_where_that_is_free() {
+fn dash_is_standard_output() {
     let dir = TestDir::new();
     let output = dir.run("ball.toml --once --report - --progress none");
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), b"".as_slice()));
@@ -417,7 +417,7 @@ fn a_dash_is_standard_output_where_that_is_free() {
     let (mut ours, theirs) = UnixStream::pair().expect("a socket");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let mut child = command.stdout(OwnedFd::from(theirs)).spawn().expect("it runs");
-    // It holds the other end.
+    // Holds the other end open.
     drop(command);
     let mut report = String::new();
     ours.read_to_string(&mut report).expect("a report");
@@ -437,13 +437,13 @@ fn a_dash_is_standard_output_where_that_is_free() {
         assert!(stderr.contains(words), "{call}: {stderr}");
     }
     assert_eq!(names(&dir), ["ball.png", "ball.toml"]);
-    // By its path it is a file like others.
+    // By its path it is a file like any other.
     dir.expect("ball.toml --once --report ./-", 0);
     assert!(dir.bytes("-").starts_with(b"{"));
 }
 
 #[test]
-fn a_signal_ends_a_report_that_nobody_reads() {
+fn signal_ends_a_blocked_report() {
     let dir = TestDir::new();
     let (reader, mut writer) = std::io::pipe().expect("a pipe");
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).expect("set");
@@ -451,7 +451,7 @@ fn a_signal_ends_a_report_that_nobody_reads() {
     fcntl(&writer, FcntlArg::F_SETFL(OFlag::empty())).expect("set");
     let mut command = dir.glimt("ball.toml --once --report - --progress none");
     let child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("it runs");
-    // The picture comes first.
+    // The image is written first.
     while !dir.path("ball.png").exists() {
         std::thread::yield_now();
     }
@@ -469,7 +469,7 @@ fn a_signal_ends_a_report_that_nobody_reads() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_told_and_a_reader_that_has_enough_is_not() {
+fn full_device_is_reported_closed_pipe_is_not() {
     let dir = TestDir::new();
     for seed in [1, 2] {
         dir.expect(&format!("ball.toml --once --progress none --seed {seed} -o {seed}.exr"), 0);
@@ -553,7 +553,7 @@ fn help_fits_and_names_every_option() {
 }
 
 #[test]
-fn progress_plain_and_none_and_color() {
+fn progress_and_color_modes() {
     let dir = room();
     let plain = dir.expect("room.toml --once --progress plain", 0);
     let stages: Vec<&str> = plain.lines().filter_map(|line| line.split_whitespace().next()).collect();
@@ -563,14 +563,14 @@ fn progress_plain_and_none_and_color() {
     );
     assert_eq!(plain, plain.trim_start(), "{plain}");
     dir.write("room.toml", ROOM.replace("radius = 0.5", "radius = 0"));
-    assert!(!dir.expect("room.toml --once --progress none", 2).is_empty(), "errors are always said");
+    assert!(!dir.expect("room.toml --once --progress none", 2).is_empty(), "errors are always printed");
     let colored = dir.run("room.toml --once --color truecolor");
     assert!(String::from_utf8_lossy(&colored.stderr).contains("\u{1b}["));
     assert!(!dir.expect("room.toml --once --color none", 2).contains('\u{1b}'));
 }
 
 #[test]
-fn what_failed_is_not_called_loaded() {
+fn failed_stages_are_not_reported_as_loaded() {
     let dir = TestDir::new();
     dir.write("bad.obj", "v 0 0 0\n");
     dir.write("ball.toml", format!("{SCENE}\n[[mesh]]\nfile = \"bad.obj\"\nmaterial = \"ball\"\n"));
@@ -579,7 +579,7 @@ fn what_failed_is_not_called_loaded() {
 }
 
 #[test]
-fn streams_that_nobody_reads() {
+fn closed_streams_are_tolerated() {
     let dir = TestDir::new();
     for line in
         ["--help", "--version", "check ball.toml", "ball.toml --once", "missing.toml --once", "--nonsense"]
@@ -591,7 +591,7 @@ fn streams_that_nobody_reads() {
         let expected = if ["missing.toml --once", "--nonsense"].contains(&line) { 2 } else { 0 };
         assert_eq!(code, Some(expected), "{line}");
     }
-    // A panic would be heard on the stream that is left.
+    // A panic would appear on the remaining stream.
     let mut child =
         dir.glimt("check ball.toml").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("runs");
     drop(child.stdout.take());
@@ -602,7 +602,7 @@ fn streams_that_nobody_reads() {
 }
 
 #[test]
-fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
+fn all_trees_give_the_same_image() {
     let dir = TestDir::new();
     for scene in ["mesh", "textures", "orbiter"] {
         let path = format!("{}/scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
@@ -616,13 +616,13 @@ fn all_trees_give_the_same_picture_of_every_scene_with_meshes() {
             reader.next_frame(&mut pixels).expect("pixels");
             pixels
         });
-        assert!(boxes.iter().any(|&byte| byte != boxes[0]), "{scene}: something is seen");
+        assert!(boxes.iter().any(|&byte| byte != boxes[0]), "{scene}: the image is not black");
         assert!(boxes == planes && boxes == pieces, "{scene}");
     }
 }
 
 #[test]
-fn warnings_point_to_what_asked_for_them() {
+fn warnings_name_the_setting_that_caused_them() {
     let dir = room();
     let lit = format!("{ROOM}\n[[light]]\n");
     dir.write("room.toml", &lit);
@@ -648,7 +648,7 @@ fn warnings_point_to_what_asked_for_them() {
 }
 
 #[test]
-fn rough_glass_is_warned_of_where_light_goes_straight_through_it() {
+fn point_light_through_rough_glass_warns() {
     let dir = TestDir::new();
     let point = "position = [0, 3, 0]";
     let sun = |angle: &str| format!("type = \"directional\"\ndirection = [0, -1, 0]\nangle = {angle}");

@@ -1,4 +1,4 @@
-//! Files on disk: written whole or not at all, whatever happens.
+//! Files on disk: written completely or not at all, whatever happens.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use glimt::output::{OutputError, check_target, write::atomic};
 
-/// Environment variable that makes a test run in a child process, with its path.
+/// Environment variable with a path that makes a test run in a child process.
 const CHILD: &str = "GLIMT_TEST_CHILD";
 
 fn child_path() -> Option<PathBuf> {
@@ -42,14 +42,14 @@ fn names(directory: &Path) -> Vec<String> {
 }
 
 fn refused(path: &Path) -> String {
-    let before = check_target(path).expect_err("refused before the work").to_string();
+    let before = check_target(path).expect_err("rejected before the work").to_string();
     let after = atomic(path, b"new").expect_err("refused at the end").to_string();
     assert_eq!(before, after);
     after
 }
 
 #[test]
-fn a_new_file_and_then_another_in_its_place() {
+fn new_file_then_replaced() {
     let directory = scratch();
     let path = directory.path().join("out.png");
     atomic(&path, b"first").expect("written");
@@ -60,7 +60,7 @@ fn a_new_file_and_then_another_in_its_place() {
 }
 
 #[test]
-fn permissions_stay() {
+fn permissions_are_kept() {
     let directory = scratch();
     let path = directory.path().join("out.png");
     fs::write(&path, "old").expect("a file");
@@ -72,11 +72,11 @@ fn permissions_stay() {
 }
 
 #[test]
-fn a_link_stays_and_its_target_is_replaced() {
+fn link_stays_and_its_target_is_replaced() {
     let directory = scratch();
     let elsewhere = scratch();
     let target = elsewhere.path().join("real.png");
-    // The first link is relative within the directory, the second absolute to another one, without a file there yet.
+    // The first link is relative within the directory, the second absolute to a file that does not exist yet.
     symlink("middle.png", directory.path().join("out.png")).expect("a link");
     symlink(&target, directory.path().join("middle.png")).expect("a link");
     let path = directory.path().join("out.png");
@@ -91,7 +91,7 @@ fn a_link_stays_and_its_target_is_replaced() {
 }
 
 #[test]
-fn links_in_a_circle_are_an_error() {
+fn link_loop_is_an_error() {
     let directory = scratch();
     symlink("b.png", directory.path().join("a.png")).expect("a link");
     symlink("a.png", directory.path().join("b.png")).expect("a link");
@@ -100,18 +100,18 @@ fn links_in_a_circle_are_an_error() {
 }
 
 #[test]
-fn a_full_disk_is_an_error() {
+fn full_disk_is_an_error() {
     let directory = scratch();
     let path = directory.path().join("x.png");
     symlink("/dev/full", &path).expect("a link");
-    check_target(&path).expect("only the write can tell");
+    check_target(&path).expect("only the write fails");
     let message = atomic(&path, b"picture").expect_err("nothing fits").to_string();
     let expected = format!(
         "cannot write {}: no space left on device; free some space or choose another place",
         path.display()
     );
     assert_eq!(message, expected);
-    assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device is still there");
+    assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device still exists");
 }
 
 #[test]
@@ -125,13 +125,13 @@ fn devices_are_written_in_place() {
 }
 
 #[test]
-fn a_pipe_without_a_reader_is_an_error_and_one_with_a_reader_gets_everything() {
+fn pipe_needs_a_reader() {
     let directory = scratch();
     let path = directory.path().join("pipe.png");
     nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     let message = atomic(&path, b"picture").expect_err("nobody reads").to_string();
     assert!(message.contains("nobody reads this pipe"), "{message}");
-    // More bytes than a pipe holds; `cat` is there once the pipe can be opened for writing.
+    // More bytes than a pipe holds; `cat` has started once the pipe can be opened for writing.
     let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i * 7 % 251) as u8).collect();
     let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
     let holder = fs::OpenOptions::new().write(true).open(&path).expect("a pipe with a reader");
@@ -164,7 +164,7 @@ fn standard_output_is_written_in_place() {
 }
 
 #[test]
-fn targets_that_cannot_be() {
+fn impossible_targets_are_reported() {
     let directory = scratch();
     let inside = |name: &str| directory.path().join(name);
     fs::create_dir(inside("dir.png")).expect("a directory");
@@ -184,16 +184,16 @@ fn targets_that_cannot_be() {
 }
 
 #[test]
-fn the_longest_name_can_be_written() {
+fn longest_possible_name_is_written() {
     let directory = scratch();
     let path = directory.path().join(format!("{}.png", "n".repeat(251)));
     atomic(&path, b"picture").expect("written");
     assert_eq!(fs::read(&path).expect("a file"), b"picture");
 }
 
-/// Root may write anything, so that this runs as a user with no rights.
+/// Root may write anything, so this runs as an unprivileged user.
 #[test]
-fn what_may_not_be_written_is_refused() {
+fn missing_permission_is_an_error() {
     if let Some(directory) = child_path() {
         let message = refused(&directory.join("closed/out.png"));
         assert!(
@@ -214,19 +214,19 @@ fn what_may_not_be_written_is_refused() {
         fs::create_dir(directory.path().join(name)).expect("a directory");
     }
     fs::write(directory.path().join("open/protected.png"), "old").expect("a file");
-    // A copy, as a user without rights may not reach where this binary is.
+    // A copy, because an unprivileged user may not reach this binary.
     let program = directory.path().join("program");
     fs::copy(this_binary(), &program).expect("a copy");
     mode("open/protected.png", 0o444);
     mode("closed", 0o555);
     mode("open", 0o777);
     mode("", 0o755);
-    let mut command = child(&program, "output::what_may_not_be_written_is_refused", directory.path());
+    let mut command = child(&program, "output::missing_permission_is_an_error", directory.path());
     if fs::metadata(directory.path()).expect("a directory").uid() == 0 {
         command.uid(65534).gid(65534);
     }
     command.current_dir("/");
-    // Another test's child may hold the copy open for a moment, between its fork and its exec.
+    // Another test's child may hold the copy open briefly, between its fork and its exec.
     let output = loop {
         match command.output() {
             Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => std::thread::yield_now(),
@@ -245,7 +245,7 @@ fn succeeded(output: &Output) {
 }
 
 #[test]
-fn a_limit_on_the_size_of_files_is_an_error_and_not_the_end() {
+fn file_size_limit_is_an_error() {
     if let Some(path) = child_path() {
         let error = atomic(&path, &vec![1; 1 << 20]).expect_err("larger than the limit");
         assert!(matches!(&error, OutputError::File { .. }));
@@ -256,7 +256,7 @@ fn a_limit_on_the_size_of_files_is_an_error_and_not_the_end() {
     let path = directory.path().join("out.png");
     fs::write(&path, "old").expect("a file");
     let script = "ulimit -f 64; exec \"$0\" --exact \"$1\"";
-    let test = "output::a_limit_on_the_size_of_files_is_an_error_and_not_the_end";
+    let test = "output::file_size_limit_is_an_error";
     let mut command = Command::new("sh");
     command.args(["-c", script]).arg(this_binary()).arg(test).env(CHILD, &path);
     succeeded(&command.output().expect("a child"));
@@ -265,7 +265,7 @@ fn a_limit_on_the_size_of_files_is_an_error_and_not_the_end() {
 }
 
 #[test]
-fn many_writers_at_once() {
+fn concurrent_writers_leave_a_whole_file() {
     let directory = scratch();
     let path = directory.path().join("out.png");
     let contents: Vec<Vec<u8>> = (0..4).map(|i| vec![i; 10_000 + usize::from(i)]).collect();
@@ -279,14 +279,14 @@ fn many_writers_at_once() {
     assert_eq!(names(directory.path()), ["out.png"]);
 }
 
-/// Two pictures that a torn file would mix.
+/// Two images that a torn file would mix.
 fn two_pictures() -> [Vec<u8>; 2] {
     [vec![0xaa; 3_000_000], vec![0x55; 2_000_001]]
 }
 
 #[test]
-fn killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up() {
-    let test = "output::killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up";
+fn kill_leaves_a_whole_file_and_cleans_up() {
+    let test = "output::kill_leaves_a_whole_file_and_cleans_up";
     let pictures = two_pictures();
     if let Some(path) = child_path() {
         for bytes in pictures.iter().cycle() {
@@ -299,7 +299,7 @@ fn killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up() {
     let mut left_behind = 0;
     for round in 0..50_u64 {
         let mut writer = child(&this_binary(), test, &path).spawn().expect("a child");
-        // Another file in its place says that it is writing; then a time of its own for each round.
+        // A second file signals that the child is writing; then the round waits for its own delay.
         let state = || fs::metadata(&path).map(|file| (file.ino(), file.mtime(), file.mtime_nsec()));
         let before = state().expect("a file");
         while state().expect("a file") == before {
@@ -313,7 +313,10 @@ fn killed_at_any_time_the_file_is_whole_and_the_next_write_clears_up() {
         assert!(pictures.contains(&found), "round {round}: a torn file of {} bytes", found.len());
         left_behind = left_behind.max(names(directory.path()).len() - 1);
     }
-    assert!(left_behind <= 1, "each write clears up after the one before, {left_behind} files were left");
+    assert!(
+        left_behind <= 1,
+        "each write removes the files of the previous one, {left_behind} files were left"
+    );
     atomic(&path, b"done").expect("written");
     assert_eq!(names(directory.path()), ["out.png"]);
 }

@@ -1,10 +1,11 @@
-//! Parts of a picture: joined, they are one render, bit for bit; what does not belong together is named, and nothing is written.
+//! Parts of an image: merged, they equal one render bit for bit. Parts that do not belong together are rejected and
+//! nothing is written.
 
 use std::fs;
 
-use crate::test_dir::TestDir;
+use crate::test_dir::{TestDir, assert_mentions};
 
-/// A lamp, a mirror that throws its light, a textured floor: something for every method.
+/// An area light, a mirror that reflects it, and a textured floor exercise every method.
 pub(crate) const ROOM: &str = r#"[render]
 width = 70
 height = 50
@@ -47,8 +48,8 @@ material = "floor"
 const STEP: &str = "v -1.5 0 0\nv -0.6 0 0\nv -1 0.9 -0.2\nf 1 2 3\n";
 const TILES: &str = "P3\n2 2\n255\n200 200 200 40 40 60\n40 40 60 200 200 200\n";
 
-/// A dir with that scene.
-pub(crate) fn dir() -> TestDir {
+/// A directory with this scene.
+pub(crate) fn room_dir() -> TestDir {
     let dir = TestDir::new();
     dir.write("room.toml", ROOM);
     dir.write("step.obj", STEP);
@@ -57,18 +58,18 @@ pub(crate) fn dir() -> TestDir {
 }
 
 #[test]
-fn an_output_replaces_no_part_but_its_own_and_no_checkpoint() {
-    let dir = dir();
+fn output_never_replaces_foreign_parts() {
+    let dir = room_dir();
     let first = "room.toml --once --progress none -o out.part --samples 2 --shard 1/2";
     dir.expect(first, 0);
     let part = dir.bytes("out.part");
     let said = dir.expect("room.toml --once --progress none --samples 2 -o out.part --shard 2/2", 2);
     assert!(said.contains("it is part 1/2 of a render") && said.contains("--force"), "{said}");
     assert!(dir.bytes("out.part") == part);
-    // The same part again may, and one of another number.
+    // The same part may be replaced, even by one of a different count.
     dir.expect("room.toml --once --progress none -o out.part --samples 2 --shard 1/3", 0);
     dir.expect(first, 0);
-    // A picture replaces neither.
+    // An image replaces neither.
     fs::rename(dir.path("out.part"), dir.path("out.exr")).expect("moved");
     let said = dir.expect("room.toml --once --progress none -o out.exr --samples 2", 2);
     assert!(said.contains("it is part 1/2 of a render"), "{said}");
@@ -80,7 +81,7 @@ fn an_output_replaces_no_part_but_its_own_and_no_checkpoint() {
     dir.expect(&format!("{keep} --force"), 0);
 }
 
-/// Methods, with a number of samples for each.
+/// Methods, with options for each.
 pub(crate) const METHODS: [(&str, &str); 5] = [
     ("whitted", "--samples 3"),
     ("path", "--integrator path --samples 5"),
@@ -103,13 +104,13 @@ fn parts(dir: &TestDir, count: u32, options: &str) -> Vec<String> {
 }
 
 #[test]
-fn parts_in_any_order_are_one_render() {
-    let dir = dir();
+fn parts_in_any_order_equal_one_render() {
+    let dir = room_dir();
     for (method, options) in METHODS {
         dir.expect(&format!("room.toml --once --progress none -o one.exr -o one.png {options}"), 0);
         for count in [2, 3, 8, 64] {
             let mut names = parts(&dir, count, options);
-            // Neither in their order nor in its reverse.
+            // Neither in order nor in reverse order.
             names.rotate_left(count as usize / 3);
             names.swap(0, 1);
             for picture in ["exr", "png"] {
@@ -122,10 +123,10 @@ fn parts_in_any_order_are_one_render() {
     }
 }
 
-/// The room at 24 samples stops at different numbers of them: the test of `error` would be empty otherwise.
+/// Checks that tiles stop at different sample counts: otherwise the `error` case would test nothing.
 #[test]
-fn the_noise_threshold_of_that_test_stops_some_tiles_early() {
-    let dir = dir();
+fn noise_target_stops_some_tiles_early() {
+    let dir = room_dir();
     let report = dir.report(&format!("room.toml {} -o a.png", METHODS[2].1));
     let samples = &report["image"]["samples"];
     assert!(samples["min"].as_u64() < samples["max"].as_u64(), "{samples}");
@@ -134,8 +135,8 @@ fn the_noise_threshold_of_that_test_stops_some_tiles_early() {
 }
 
 #[test]
-fn views_and_crops_are_joined_too() {
-    let dir = dir();
+fn views_and_crops_are_merged() {
+    let dir = room_dir();
     for options in [
         "--view samples --samples 64 --error 0.2",
         "--view error --samples 8",
@@ -150,8 +151,8 @@ fn views_and_crops_are_joined_too() {
 }
 
 #[test]
-fn what_does_not_belong_together_is_named_and_nothing_is_written() {
-    let dir = dir();
+fn mismatched_parts_are_rejected() {
+    let dir = room_dir();
     let names = parts(&dir, 3, "");
     dir.write("joined.png", "the picture before");
     let refused = |line: &str, words: &str| {
@@ -180,14 +181,14 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     dir.write("tiles.ppm", TILES.replace("200", "201"));
     other("--shard 2/3", "tiles.ppm has another content");
     dir.write("tiles.ppm", TILES);
-    // The same files in another folder are the same picture.
+    // The same files in another folder give the same image.
     fs::create_dir(dir.path("away")).expect("a folder");
     for (name, text) in [("room.toml", ROOM), ("step.obj", STEP), ("tiles.ppm", TILES)] {
         dir.write(&format!("away/{name}"), text);
     }
     dir.expect("away/room.toml --once --progress none -o other.part --shard 2/3", 0);
     dir.expect("merge away.png 1.part other.part 3.part --progress none", 0);
-    // Some that are damaged, each named.
+    // Several damaged parts are all reported.
     let whole = dir.bytes("2.part");
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 4;
@@ -199,17 +200,17 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     newer[12] = 2;
     dir.write("newer.part", newer);
     refused("1.part newer.part 3.part", "version 2 of the format");
-    // A part never becomes a picture, whatever its name.
+    // A part never becomes an image, whatever its name.
     let said = dir.expect("merge 1.part 2.part 3.part --progress none", 2);
     assert!(said.contains("1.part"), "{said}");
     fs::copy(dir.path("1.part"), dir.path("1.png")).expect("copied");
     let said = dir.expect("merge 1.png 2.part 3.part --progress none", 2);
     assert!(said.contains("cannot write 1.png: it is a part"), "{said}");
     dir.expect("compare 1.png away.png", 2);
-    // The name of the picture comes first.
+    // The name of the image comes first.
     let said = dir.expect("merge 1.part 2.part 3.part out.png --progress none", 2);
     assert!(said.contains("cannot write 1.part: it is a part; name the picture first"), "{said}");
-    // The second name of the picture is taken for a part.
+    // If the image is named twice, the second name is taken for a part.
     fs::copy(dir.path("away.png"), dir.path("twice.png")).expect("copied");
     for name in ["twice.png", "nowhere.png"] {
         let said = dir.expect(&format!("merge {name} ./{name} 2.part 3.part --progress none"), 2);
@@ -222,10 +223,10 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
 }
 
 #[test]
-fn a_joined_picture_takes_the_place_of_nothing_that_it_is_made_of() {
-    let dir = dir();
+fn merge_never_replaces_a_source_file() {
+    let dir = room_dir();
     parts(&dir, 2, "");
-    // A copy elsewhere, as where parts were rendered on other machines.
+    // A copy elsewhere, as when parts were rendered on other machines.
     fs::create_dir(dir.path("elsewhere")).expect("a folder");
     fs::copy(dir.path("tiles.ppm"), dir.path("elsewhere/copy.ppm")).expect("copied");
     for name in ["tiles.ppm", "elsewhere/copy.ppm"] {
@@ -236,7 +237,7 @@ fn a_joined_picture_takes_the_place_of_nothing_that_it_is_made_of() {
             assert_eq!(dir.bytes(name), TILES.as_bytes());
         }
     }
-    // One that has changed since, or is not there.
+    // A file that has changed since, or is missing.
     for content in [Some("P3 1 1 255 9 9 9\n"), None] {
         match content {
             Some(text) => dir.write("tiles.ppm", text),
@@ -255,8 +256,8 @@ fn a_joined_picture_takes_the_place_of_nothing_that_it_is_made_of() {
 }
 
 #[test]
-fn what_is_there_is_joined_if_that_is_asked_for() {
-    let dir = dir();
+fn partial_merges_the_existing_parts() {
+    let dir = room_dir();
     dir.expect("room.toml --once --progress none -o one.exr", 0);
     parts(&dir, 4, "");
     let said = dir.expect("merge some.exr 4.part 1.part none.part --partial", 0);
@@ -266,18 +267,16 @@ fn what_is_there_is_joined_if_that_is_asked_for() {
     );
     let said = dir.expect("merge all.exr 4.part 3.part 2.part 1.part --partial", 0);
     assert!(!said.contains("missing"), "{said}");
-    assert!(
-        dir.bytes("all.exr") == dir.bytes("one.exr") && dir.bytes("some.exr") != dir.bytes("one.exr")
-    );
-    // Photons: fewer blocks, the same pixels.
+    assert!(dir.bytes("all.exr") == dir.bytes("one.exr") && dir.bytes("some.exr") != dir.bytes("one.exr"));
+    // With photons: fewer passes, the same pixels.
     parts(&dir, 2, "--photons on --samples 32 --set photons.count=100");
     dir.expect("merge half.exr 1.part --partial --progress none", 0);
     dir.expect("merge half.exr 1.part --progress none", 2);
 }
 
 #[test]
-fn a_merge_waits_for_parts_and_shows_what_does_not_fit_at_once() {
-    let dir = dir();
+fn watching_merge_waits_for_missing_parts() {
+    let dir = room_dir();
     dir.expect("room.toml --once --progress none -o one.exr", 0);
     parts(&dir, 2, "");
     fs::rename(dir.path("2.part"), dir.path("later")).expect("renamed");
@@ -294,8 +293,8 @@ fn a_merge_waits_for_parts_and_shows_what_does_not_fit_at_once() {
 }
 
 #[test]
-fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
-    let dir = dir();
+fn watching_merge_waits_for_incomplete_parts() {
+    let dir = room_dir();
     dir.expect("room.toml --once --progress none -o one.exr", 0);
     parts(&dir, 2, "");
     let whole = dir.bytes("2.part");
@@ -320,25 +319,25 @@ fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
         assert!(dir.bytes("joined.exr") == dir.bytes("one.exr"));
         fs::remove_file(dir.path("joined.exr")).expect("removed");
     }
-    // One that is damaged does not become whole.
+    // A damaged part never becomes complete.
     let mut flipped = whole.clone();
     flipped[whole.len() / 2] ^= 4;
     dir.write("2.part", flipped);
     let said = dir.expect("merge joined.exr 1.part 2.part --watch --progress none", 2);
     assert!(said.contains("2.part: it is damaged: the bytes from"), "{said}");
-    // Without --watch it is an error at once.
+    // Without --watch an incomplete part is an error.
     dir.write("2.part", &whole[..whole.len() - 1]);
     let said = dir.expect("merge joined.exr 1.part 2.part --progress none", 2);
     assert!(said.contains("2.part: it is damaged: it ends at byte"), "{said}");
     assert!(!dir.path("joined.exr").exists());
 }
 
-/// Only a user other than root can test this: root may write everywhere.
+/// Only an unprivileged user can run this test: root may write everywhere.
 #[test]
-fn a_merge_replaces_what_a_render_would_and_nothing_else() {
+fn merge_replaces_the_same_files_as_a_render() {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
     use std::os::unix::process::CommandExt;
-    let dir = dir();
+    let dir = room_dir();
     parts(&dir, 2, "");
     let program = dir.program();
     let is_root = fs::metadata(dir.0.path()).expect("a folder").uid() == 0;
@@ -361,13 +360,13 @@ fn a_merge_replaces_what_a_render_would_and_nothing_else() {
         }
         let _ = fs::remove_file(dir.path("link.png"));
         symlink("target.png", dir.path("link.png")).expect("a link");
-        // A file that is protected stays.
+        // A protected file is kept.
         fs::set_permissions(&kept, fs::Permissions::from_mode(0o444)).expect("permitted");
         let (code, text) = said(&call.replace("NAME", "kept.png"));
         assert_eq!(code, Some(1), "{call}: {text}");
         assert!(text.contains("cannot write kept.png") && text.contains("allow writing there"), "{text}");
         assert_eq!(fs::read(&kept).expect("a file"), b"the image before");
-        // A link stays, and its target is replaced.
+        // A link is kept, and its target replaced.
         let (code, text) = said(&call.replace("NAME", "link.png"));
         assert_eq!(code, Some(0), "{call}: {text}");
         let link = dir.path("link.png").symlink_metadata().expect("a link");
@@ -379,8 +378,8 @@ fn a_merge_replaces_what_a_render_would_and_nothing_else() {
 }
 
 #[test]
-fn what_cannot_be_divided_is_refused_before_the_work() {
-    let dir = dir();
+fn indivisible_renders_are_rejected() {
+    let dir = room_dir();
     for (line, words) in [
         ("--once --shard 1/2", "-o must name its file"),
         ("--once --shard 1/2 -o a.part -o b.part", "-o must name its file"),
@@ -397,8 +396,8 @@ fn what_cannot_be_divided_is_refused_before_the_work() {
 }
 
 #[test]
-fn scripts_of_schedulers_are_sound() {
-    let dir = dir();
+fn scheduler_scripts_are_valid() {
+    let dir = room_dir();
     for engine in ["slurm", "parallel", "kubernetes"] {
         let line = format!("farm room.toml -o out.exr --shards 4 --engine {engine} --host a -- --samples 9");
         let output = dir.run(&line);
@@ -421,8 +420,8 @@ fn scripts_of_schedulers_are_sound() {
 }
 
 #[test]
-fn a_render_that_needs_more_memory_than_allowed_is_refused_with_the_numbers() {
-    let dir = dir();
+fn memory_limit_rejects_large_renders() {
+    let dir = room_dir();
     let said = dir.expect("room.toml --once -o a.png --width 9000 --height 9000 --memory 500MB", 1);
     assert!(said.contains("the render needs about 4.1") && said.contains("477 MiB of --memory"), "{said}");
     assert!(!said.contains("render   "), "nothing is rendered: {said}");

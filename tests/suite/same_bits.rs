@@ -1,17 +1,17 @@
-//! The same bits on every machine, by every instruction set: hashes of small pictures that stand here.
+//! The same bits on every machine and with every instruction set: expected hashes of small images.
 
 use glimt::accel::InstructionSet;
 
 use super::test_dir::TestDir;
 
-/// FNV-1a of the bits of a picture's numbers.
+/// FNV-1a of the bits of an image's numbers.
 fn hash(dir: &TestDir, name: &str) -> u64 {
     let picture = image::open(dir.path(name)).expect("a picture").to_rgb32f();
     let bytes = picture.as_raw().iter().flat_map(|x| x.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
-/// Lamps and shapes of every kind, mirror, glass, textured lookups by the shapes' own coordinates, a lens, a filter.
+/// Every kind of light and shape, mirror, glass, textures through the shapes' own coordinates, a lens, a filter.
 const EVERYTHING: &str = r#"
 [render]
 width = 40
@@ -96,7 +96,7 @@ intensity = [9, 9, 9]
 "#;
 
 #[test]
-fn known_pictures_have_their_bits_by_every_instruction_set() {
+fn known_images_keep_their_bits() {
     let dir = TestDir::new();
     dir.write("sky.ppm", "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3");
     let known: [(&str, &str, u64); 5] = [
@@ -136,7 +136,7 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
             assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
             let found = hash(&dir, "all.exr");
             if found != *expected {
-                wrong.push(format!("number {number} by {name}: {found:#018x}"));
+                wrong.push(format!("image {number} with {name}: {found:#018x}"));
             }
         }
     }
@@ -148,7 +148,7 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
     assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
 }
 
-/// Materials of microfacets, bump and normal maps, opacity, panes.
+/// Microfacet materials, bump and normal maps, opacity, panes.
 const MATERIALS: &str = r#"
 [render]
 width = 40
@@ -218,7 +218,7 @@ intensity = [9, 9, 9]
 "#;
 
 #[test]
-fn materials_have_the_same_bits_by_every_instruction_set() {
+fn materials_keep_their_bits() {
     let dir = TestDir::new();
     dir.write(
         "waves.ppm",
@@ -240,7 +240,7 @@ fn materials_have_the_same_bits_by_every_instruction_set() {
     }
 }
 
-/// A grid over a square at y = 0, with its middles a little higher, in so many steps.
+/// A grid over a square at y = 0 with slightly raised centers, in `steps` steps.
 fn uneven_floor(steps: u32) -> String {
     let mut text = String::new();
     for i in 0..=steps {
@@ -260,7 +260,7 @@ fn uneven_floor(steps: u32) -> String {
 }
 
 #[test]
-fn trees_of_boxes_and_of_planes_give_the_same_pictures_by_photons() {
+fn photon_images_ignore_the_tree() {
     let dir = TestDir::new();
     dir.write("fine.obj", uneven_floor(40));
     dir.write("coarse.obj", uneven_floor(6));
@@ -286,7 +286,7 @@ fn trees_of_boxes_and_of_planes_give_the_same_pictures_by_photons() {
 }
 
 #[test]
-fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
+fn known_photon_image_keeps_its_bits() {
     const KNOWN: u64 = 0x777f_28d8_83fa_7d9c;
     let dir = TestDir::new();
     let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");

@@ -1,4 +1,5 @@
-//! The program in a person's shell: completions, the manual page, the call without a word, the environment, `glimt doctor`.
+//! The program in the user's shell: completions, the manual page, a call without arguments, the environment,
+//! `glimt doctor`.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,12 +7,12 @@ use std::process::Command;
 
 use glimt::cli::environment::VARIABLES;
 
-use crate::test_dir::TestDir;
 use crate::terminal::pty::Folder;
+use crate::test_dir::TestDir;
 
-/// The candidates of bash for a line, whose last word is being typed.
+/// Bash's completions for a line, whose last word is being typed.
 fn in_bash(dir: &TestDir, line: &str) -> Vec<String> {
-    // As bash does when the key is pressed; `=` ends a word there.
+    // As bash does when Tab is pressed; `=` ends a word there.
     let script = r#"
         source <(glimt completions bash)
         COMP_LINE=$1 COMP_POINT=${#1} COMP_TYPE=9 COMP_WORDBREAKS=$' \t\n"\'><=;|&(:'
@@ -34,7 +35,7 @@ fn in_bash(dir: &TestDir, line: &str) -> Vec<String> {
 }
 
 #[test]
-fn bash_completes_commands_scenes_models_and_keys_of_the_scene() {
+fn bash_completes_commands_files_and_keys() {
     let dir = TestDir::new();
     for name in ["knot.obj", "notes.txt", "view.png"] {
         dir.write(name, "");
@@ -54,7 +55,7 @@ fn bash_completes_commands_scenes_models_and_keys_of_the_scene() {
 }
 
 #[test]
-fn real_shells_complete_what_is_typed() {
+fn installed_shells_complete_lines() {
     let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/shells.py");
     let output = Command::new("python3").arg(script).arg(TestDir::new().glimt("").get_program()).output();
     let output = output.expect("python3");
@@ -64,7 +65,7 @@ fn real_shells_complete_what_is_typed() {
 }
 
 #[test]
-fn every_shell_has_its_script() {
+fn every_shell_has_a_completion_script() {
     let dir = TestDir::new();
     for (shell, mark) in [
         ("bash", "complete -o nospace"),
@@ -84,7 +85,7 @@ fn every_shell_has_its_script() {
 }
 
 #[test]
-fn the_manual_has_every_command_option_and_variable() {
+fn manual_lists_commands_options_and_variables() {
     let dir = TestDir::new();
     let page = |line: &str| String::from_utf8(dir.run(line).stdout).expect("UTF-8").replace("\\-", "-");
     let whole = page("man");
@@ -108,17 +109,17 @@ fn the_manual_has_every_command_option_and_variable() {
 }
 
 #[test]
-fn a_call_without_a_word_leads_to_a_scene() {
+fn call_without_arguments_suggests_a_scene() {
     let dir = TestDir::new();
     let said = dir.expect("", 2);
     assert!(said.contains("glimt new ball.toml") && said.contains("glimt -h"), "{said}");
     assert!(said.lines().count() < 10, "{said}");
-    // An option alone is a call that lacks its scene.
+    // Only an option is a call without its scene.
     assert!(dir.expect("--once", 2).contains("<SCENE>"));
 }
 
 #[test]
-fn the_long_help_names_the_environment_and_the_short_one_does_not() {
+fn only_long_help_lists_the_environment() {
     let dir = TestDir::new();
     let help = |option: &str| String::from_utf8(dir.run(option).stdout).expect("UTF-8");
     let (long, short) = (help("--help"), help("-h"));
@@ -128,7 +129,7 @@ fn the_long_help_names_the_environment_and_the_short_one_does_not() {
     assert!(!short.contains("SSH_TTY") && short.contains("Exit codes:"), "{short}");
 }
 
-/// Names in capitals that sources ask the environment for, in the ways that they have of asking.
+/// Names of environment variables that sources read, in each way that they read them.
 fn asked_in(text: &str) -> BTreeSet<String> {
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     let is_name = |word: &&str| {
@@ -140,7 +141,7 @@ fn asked_in(text: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_list_of_variables_has_what_the_sources_ask_for() {
+fn variable_list_matches_the_sources() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let listed: BTreeSet<String> =
         VARIABLES.iter().flat_map(|(names, _)| names.split(", ")).map(str::to_owned).collect();
@@ -165,16 +166,16 @@ fn the_list_of_variables_has_what_the_sources_ask_for() {
         }
     }
     asked.remove("CARGO_PKG_VERSION");
-    // Libraries ask for these: those of arguments, help and progress bars.
+    // Libraries for arguments, help and progress bars read these.
     let of_libraries = ["CLICOLOR", "CLICOLOR_FORCE", "COLUMNS", "LANG"].map(str::to_owned);
     asked.extend(of_libraries);
-    // The one name that is not in capitals.
+    // The only name that is not in capitals.
     asked.insert("ConEmuANSI".to_owned());
     assert_eq!(asked, listed);
 }
 
 #[test]
-fn doctor_reports_without_a_terminal() {
+fn doctor_works_without_a_terminal() {
     let dir = TestDir::new();
     let mut glimt = dir.glimt("doctor");
     glimt.env("GLIMT_SIMD", "portable").env("XDG_CACHE_HOME", dir.path("cache")).env("VISUAL", "hx");
@@ -192,7 +193,7 @@ fn doctor_reports_without_a_terminal() {
 }
 
 #[test]
-fn doctor_reports_what_the_terminal_answers() {
+fn doctor_reports_terminal_replies() {
     let folder = Folder::new();
     let program = folder.program();
     let mut terminal = folder.terminal_with(&[program, "doctor"], &[]);

@@ -5,12 +5,12 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::test_dir::{TestDir, PROGRAM};
 use super::gltf::{Glb, cube, cubes};
+use super::test_dir::{PROGRAM, TestDir, assert_mentions, mentions};
 
 const SMALL: &str = "--once --force --width 48 --height 36 --samples 4 --error 0";
 
-/// A picture's linear values.
+/// An image's linear values.
 fn picture(dir: &TestDir, line: &str) -> Vec<f32> {
     dir.expect(&format!("{line} {SMALL} -o picture.exr"), 0);
     image::open(dir.path("picture.exr")).expect("a picture").to_rgb32f().into_raw()
@@ -20,7 +20,7 @@ fn checker() -> Vec<u8> {
     fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/checker.png")).expect("an image")
 }
 
-/// An OBJ file of a box of these sizes.
+/// An OBJ file of a box with these sizes.
 fn box_of([x, y, z]: [i32; 3]) -> String {
     let corner =
         |bits: i32| format!("v {} {} {}\n", (bits & 1) * x, (bits >> 1 & 1) * y, (bits >> 2 & 1) * z);
@@ -28,12 +28,12 @@ fn box_of([x, y, z]: [i32; 3]) -> String {
     corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
-/// Rows and columns in which pixels differ from those of the ground and the sky, which look the same: least and greatest of each.
+/// Bounds of the columns and rows in which pixels differ from the ground and the sky, which look alike.
 fn covered(pixels: &[f32]) -> [usize; 4] {
     let mut bounds = [48, 0, 36, 0];
     for (index, pixel) in pixels.chunks(3).enumerate() {
         let (x, y) = (index % 48, index / 48);
-        // The view of normals is black where nothing is, and the ground's normal is (0, 1, 0).
+        // The normal view is black where nothing is visible, and the ground's normal is (0, 1, 0).
         let is_ground =
             pixel.iter().zip([0.5, 1.0, 0.5]).all(|(value, ground)| (value - ground).abs() < 0.05);
         if !is_ground && pixel.iter().any(|value| *value > 0.0) {
@@ -44,7 +44,7 @@ fn covered(pixels: &[f32]) -> [usize; 4] {
 }
 
 #[test]
-fn a_model_is_framed_from_every_side() {
+fn model_is_framed_from_every_side() {
     let dir = TestDir::new();
     dir.write("box.obj", box_of([3, 2, 1]));
     for (side, ratio) in [("front", 1.5), ("back", 1.5), ("left", 0.5), ("right", 0.5)] {
@@ -55,7 +55,7 @@ fn a_model_is_framed_from_every_side() {
         assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
         assert!(width > 36.0 || height > 26.0, "{side}: it fills the frame: {width} × {height}");
     }
-    // A tower along each axis stands upright by --up; Blender's PLY files have z up.
+    // A tower along each axis is upright with --up; Blender's PLY files have z up.
     for (up, sizes) in [("x", [4, 1, 1]), ("y", [1, 4, 1]), ("z", [1, 1, 4])] {
         dir.write("tower.obj", box_of(sizes));
         let [left, right, top, bottom] =
@@ -76,12 +76,12 @@ fn a_model_is_framed_from_every_side() {
     assert!(stderr.contains("--from is for models"), "{stderr}");
 }
 
-/// The same shape in a format that counts z upwards stands as the one that counts y upwards.
+/// A shape in a z-up format looks the same as in a y-up format.
 #[test]
-fn stl_files_stand_on_their_ground() {
+fn stl_files_are_z_up() {
     let dir = TestDir::new();
     dir.write("box.obj", box_of([3, 2, 1]));
-    // Of x, y and z: the width, the depth to the back, the height.
+    // In x, y and z: the width, the depth, the height.
     let facets = box_of([3, 1, 2]);
     let corners: Vec<&str> = facets.lines().filter_map(|line| line.strip_prefix("v ")).collect();
     let faces = facets.lines().filter_map(|line| line.strip_prefix("f "));
@@ -99,7 +99,7 @@ fn stl_files_stand_on_their_ground() {
 }
 
 #[test]
-fn an_import_is_the_picture_of_the_model() {
+fn import_renders_like_the_model() {
     let dir = TestDir::new();
     dir.write("cubes.glb", cubes(&checker()));
     let shown = picture(&dir, "cubes.glb");
@@ -115,9 +115,9 @@ fn an_import_is_the_picture_of_the_model() {
     ] {
         assert!(text.contains(words), "{words}\nin\n{text}");
     }
-    // The image in its folder is the one that was put into the model.
+    // The image in its folder is the one embedded in the model.
     assert_eq!(dir.bytes("scene_files/checks.png"), checker());
-    // It never writes over a file or into a folder that is there.
+    // Import never overwrites an existing file or folder.
     let said = dir.expect("import cubes.glb -o scene.toml", 2);
     assert!(said.contains("scene.toml exists already, and is left as it is"), "{said}");
     fs::remove_file(dir.path("scene.toml")).expect("removed");
@@ -126,9 +126,9 @@ fn an_import_is_the_picture_of_the_model() {
     assert!(dir.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
 }
 
-/// The colour by the first set of coordinates, the emission by the second, as programs with light maps write it.
+/// The color uses the first set of coordinates, the emission the second, as in exports with light maps.
 #[test]
-fn both_sets_of_coordinates_are_shown_and_imported() {
+fn both_uv_sets_are_imported() {
     let dir = TestDir::new();
     let write = |emission_set: u32| {
         let mut glb = Glb::default();
@@ -156,7 +156,7 @@ fn both_sets_of_coordinates_are_shown_and_imported() {
     assert_eq!(picture(&dir, "a.toml"), of_both);
     let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
     assert!(text.contains("[textures.checks_2]\nfile = \"a_files/checks.png\"\nuv = 1\n"), "{text}");
-    // A mesh without a second set says so, and shows the first.
+    // A mesh without a second set warns, and uses the first.
     dir.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
     dir.write("b.toml", text.replace("a_files/cube.ply", "b.obj"));
     let said = dir.expect(&format!("b.toml {SMALL} -o b.exr"), 0);
@@ -165,7 +165,7 @@ fn both_sets_of_coordinates_are_shown_and_imported() {
     assert!(said.contains(words), "{said}");
 }
 
-/// A cube with an image that is a file of this name.
+/// A cube with an image in a file of this name.
 fn with_image(uri: &str) -> Vec<u8> {
     let mut glb = Glb::default();
     let mut cube = cube(&mut glb);
@@ -177,9 +177,9 @@ fn with_image(uri: &str) -> Vec<u8> {
     }))
 }
 
-/// A file that somebody else made must not carry others of this machine into the folder of a scene.
+/// A model from somewhere else must not copy other files of this machine into a scene's folder.
 #[test]
-fn an_import_copies_images_alone() {
+fn import_copies_only_images() {
     let dir = TestDir::new();
     dir.write("secret", "root:x:0:0\n");
     dir.write("secret.png", "root:x:0:0\n");
@@ -189,7 +189,7 @@ fn an_import_copies_images_alone() {
         assert!(said.contains(name) && said.contains("images[0]"), "{said}");
         assert!(!dir.path("a.toml").exists() && !dir.path("a_files").exists());
     }
-    // An image without an ending gets that of its content; no name leads out of the folder.
+    // An image without an extension gets the one of its content; no name leads out of the folder.
     dir.write("picture", checker());
     dir.write("a.glb", with_image("picture"));
     dir.expect("import a.glb", 0);
@@ -197,16 +197,16 @@ fn an_import_copies_images_alone() {
     assert!(dir.path("a_files/_cube.ply").exists());
 }
 
-/// Files that could not all be written are removed.
+/// Removes its files if one of them could not be written.
 #[test]
-fn an_import_that_fails_leaves_nothing() {
+fn failed_import_leaves_nothing() {
     let dir = TestDir::new();
     dir.write("cubes.glb", cubes(&checker()));
-    // The scene's name is taken by a folder that nobody looked for: a link to nowhere is one too.
+    // The scene's name is already taken by a dangling link.
     std::os::unix::fs::symlink("nowhere", dir.path("taken.toml")).expect("a link");
     assert!(dir.expect("import cubes.glb -o taken.toml", 2).contains("taken.toml exists already"));
     assert!(!dir.path("taken_files").exists());
-    // No file may grow beyond a block of 512 bytes.
+    // No file may exceed a block of 512 bytes.
     let shell = std::process::Command::new("sh")
         .args(["-c", &format!("ulimit -f 1; exec {PROGRAM} import cubes.glb -o full.toml")])
         .current_dir(dir.path("."))
@@ -219,9 +219,9 @@ fn an_import_that_fails_leaves_nothing() {
     dir.expect("import cubes.glb -o full.toml", 0);
 }
 
-/// A scene whose numbers no scene takes is not written, and the message names the number of the glTF file.
+/// A scene with invalid numbers is not written, and the message names the number in the glTF file.
 #[test]
-fn numbers_beyond_what_scenes_take_are_the_files_own_fault() {
+fn out_of_range_numbers_name_the_gltf_node() {
     let dir = TestDir::new();
     let lamp = |intensity: f64| {
         json!({"nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 5, 0]}],
@@ -246,7 +246,7 @@ fn numbers_beyond_what_scenes_take_are_the_files_own_fault() {
         let said = dir.expect(&format!("a.glb {SMALL}"), 2);
         assert!(said.contains(words) && !said.contains("a.glb:"), "{words}: {said}");
     }
-    // What is read is a scene that can be checked.
+    // A model that can be read is a scene that passes the check.
     let mut glb = Glb::default();
     let mut model = lamp(9e14);
     model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
@@ -256,7 +256,7 @@ fn numbers_beyond_what_scenes_take_are_the_files_own_fault() {
 }
 
 #[test]
-fn a_count_that_no_file_holds_is_shown_as_it_is() {
+fn impossible_counts_are_reported_exactly() {
     let dir = TestDir::new();
     let mut glb = Glb::default();
     let cube = cube(&mut glb);
@@ -266,25 +266,22 @@ fn a_count_that_no_file_holds_is_shown_as_it_is() {
     assert!(said.contains("1000000000000 corners"), "{said}");
 }
 
-/// Whenever it is killed, an import leaves all of a scene or nothing that is seen, and the next one is not in its way.
+/// Whenever it is killed, an import leaves either the whole scene or nothing visible, and the next one succeeds.
 #[test]
-fn an_interrupted_import_leaves_nothing() {
+fn interrupted_import_leaves_nothing() {
     use nix::sys::signal::{Signal, kill};
     use nix::unistd::Pid;
-    /// Most imports that may end before the signal.
+    /// Limit of imports that may end before the signal arrives.
     const TRIES: u32 = 20;
     let dir = TestDir::new();
-    // Many parts of some size, so that writing takes a while.
+    // Many large parts, so that writing takes a while.
     let mut glb = Glb::default();
     let positions: Vec<[f32; 3]> =
         (0..30_000).map(|i| [(i % 250) as f32, (i / 250) as f32, (i % 7) as f32]).collect();
-    // Each has numbers of its own: parts of the same ones would be written once.
+    // Each has its own numbers, because equal parts would be written only once.
     let parts = (0..30).map(|_| json!({"attributes": {"POSITION": glb.vectors(&positions)}}));
     let primitives: Vec<_> = parts.collect();
-    dir.write(
-        "big.glb",
-        glb.finish(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": primitives}]})),
-    );
+    dir.write("big.glb", glb.finish(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": primitives}]})));
     let hidden = || {
         let entries = fs::read_dir(dir.path(".")).expect("a folder").flatten();
         entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(".o.toml.glimt-")).count()
@@ -298,7 +295,7 @@ fn an_interrupted_import_leaves_nothing() {
         let run = || {
             let mut import = dir.glimt("import big.glb -o o.toml");
             let mut child = import.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
-            // End it while it writes.
+            // Kill it while it writes.
             while hidden() == 0 && child.try_wait().expect("a state").is_none() {
                 std::thread::yield_now();
             }
@@ -306,7 +303,7 @@ fn an_interrupted_import_leaves_nothing() {
             child.wait_with_output().expect("its end")
         };
         let mut output = run();
-        // On a busy machine it may have come to its end before.
+        // On a busy machine it may have ended before.
         for _ in 0..TRIES {
             if output.status.code() != Some(0) {
                 break;
@@ -328,11 +325,11 @@ fn an_interrupted_import_leaves_nothing() {
         assert_eq!(hidden(), usize::from(signal == Signal::SIGKILL && !is_whole), "{signal}");
     }
     dir.expect("import big.glb -o o.toml", 0);
-    assert_eq!(hidden(), 0, "what a killed one left is removed");
+    assert_eq!(hidden(), 0, "leftovers of a killed import are removed");
 }
 
 #[test]
-fn approximations_are_named_counted_and_refused_if_strict() {
+fn strict_import_rejects_approximations() {
     let dir = TestDir::new();
     let mut glb = Glb::default();
     let mut cube = cube(&mut glb);
@@ -360,7 +357,7 @@ fn approximations_are_named_counted_and_refused_if_strict() {
 }
 
 #[test]
-fn a_model_s_own_cameras_and_lights_count() {
+fn model_cameras_and_lights_are_used() {
     let dir = TestDir::new();
     let mut glb = Glb::default();
     let cube = cube(&mut glb);
@@ -385,9 +382,9 @@ fn a_model_s_own_cameras_and_lights_count() {
     assert!(!text.contains("directional"), "{text}");
 }
 
-/// glimt cuts the light by way of polished surfaces, and says so. Other models show all of it.
+/// Glimt clamps the light reflected by polished surfaces, and says so. Other models are unbiased.
 #[test]
-fn only_polished_models_are_clamped_and_say_so() {
+fn only_polished_models_are_clamped() {
     let dir = TestDir::new();
     for (roughness, is_polished) in [(0.1, true), (0.5, false)] {
         let mut glb = Glb::default();
@@ -413,9 +410,9 @@ fn only_polished_models_are_clamped_and_say_so() {
     assert!(!dir.expect(&format!("box.obj {SMALL} -o a.exr"), 0).contains("clamp"));
 }
 
-/// A part of a scene's own, and a whole file with its materials.
+/// A part with a material from the scene, and a whole file with its own materials.
 #[test]
-fn a_scene_may_name_a_gltf_file_or_a_part_of_it() {
+fn scene_can_use_a_gltf_file_or_a_part() {
     let dir = TestDir::new();
     dir.write("cubes.glb", cubes(&checker()));
     let check = |text: &str, code: i32| {
@@ -448,7 +445,7 @@ fn a_scene_may_name_a_gltf_file_or_a_part_of_it() {
 }
 
 #[test]
-fn a_broken_model_is_an_error_with_its_place() {
+fn broken_model_errors_have_a_position() {
     let dir = TestDir::new();
     for (file, content, words) in [
         ("a.glb", &b"glTF\x02\0\0\0\0\0\0\0"[..], "it has no JSON"),
@@ -464,7 +461,7 @@ fn a_broken_model_is_an_error_with_its_place() {
 }
 
 #[test]
-fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
+fn small_distant_model_is_framed() {
     let dir = TestDir::new();
     let moved = |size: f64, to: f64| {
         let corner = |bits: i32| {
@@ -486,7 +483,7 @@ fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
 }
 
 #[test]
-fn what_an_import_would_copy_damaged_is_refused_with_the_name_of_the_image() {
+fn damaged_images_are_not_imported() {
     let dir = TestDir::new();
     let mut damaged = checker();
     let place = damaged.len() - 20;
@@ -501,7 +498,7 @@ fn what_an_import_would_copy_damaged_is_refused_with_the_name_of_the_image() {
 }
 
 #[test]
-fn models_that_cannot_be_shown_are_named_by_what_is_wrong() {
+fn unusable_models_are_rejected() {
     let dir = TestDir::new();
     for ending in ["obj", "off"] {
         let text = match ending {
@@ -527,11 +524,11 @@ fn models_that_cannot_be_shown_are_named_by_what_is_wrong() {
 }
 
 #[test]
-fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
+fn model_errors_show_no_generated_line() {
     let dir = TestDir::new();
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl q\nf 1 2 3\n";
     dir.write("a.obj", format!("mtllib a.mtl\n{triangle}"));
-    // A material file that was not copied along.
+    // A material file that was not copied with the model.
     for call in [format!("a.obj {SMALL} -o a.png"), "check a.obj".to_owned()] {
         let said = String::from_utf8(dir.run(&call).stderr).expect("UTF-8");
         assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
@@ -546,9 +543,9 @@ fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
     assert!(said.contains("cannot write nope.png") && !said.contains("a.obj:"), "{said}");
 }
 
-/// The picture is that of the ground alone, which says nothing of what is wrong.
+/// The image shows only the ground, which does not reveal the reason.
 #[test]
-fn a_model_of_which_nothing_is_seen_says_so() {
+fn invisible_model_warns() {
     let dir = TestDir::new();
     let said = |file: &str| {
         let said = dir.expect(&format!("{file} {SMALL} -o a.exr"), 0);
@@ -589,8 +586,8 @@ fn a_model_of_which_nothing_is_seen_says_so() {
             fs::remove_dir_all(dir.path("a_files")).expect("removed");
         }
     }
-    assert!(unseen.iter().all(|picture| *picture == unseen[0]), "the ground alone");
-    // One face that is seen is enough.
+    assert!(unseen.iter().all(|picture| *picture == unseen[0]), "only the ground");
+    // One visible face is enough.
     let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl p\nf 1 2 3\nusemtl q\nf 1 3 2\n";
     dir.write("a.obj", faces);
     for (mtl, count) in [
@@ -605,9 +602,9 @@ fn a_model_of_which_nothing_is_seen_says_so() {
     }
 }
 
-/// A model whose picture was not copied along is shown without it.
+/// A model whose images were not copied with it is shown without them.
 #[test]
-fn a_model_is_shown_without_pictures_that_cannot_be_read() {
+fn model_is_shown_without_missing_images() {
     let dir = TestDir::new();
     let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl q\nf 1/1 2/2 3/3\n";
     dir.write("a.obj", faces);
@@ -618,7 +615,7 @@ fn a_model_is_shown_without_pictures_that_cannot_be_read() {
         ("Kd 0.8 0.2 0.1\nKs 0.1 0.1 0.1\nNs 20\nKe 0.1 0 0\nd 0.7\n", maps, &names[..]),
         ("Kd 0.8 0.2 0.1\nPr 0.2\nPm 0.5\n", physical, &["kd.png", "pr.png", "pm.png"]),
     ] {
-        // A map that shines is not replaced by light all over.
+        // An emission map is not replaced by emission everywhere.
         dir.write("a.mtl", format!("newmtl q\n{}", plain.replace("Ke 0.1 0 0\n", "")));
         let expected = picture(&dir, "a.obj");
         dir.write("a.mtl", format!("newmtl q\n{plain}{maps}"));
@@ -636,13 +633,13 @@ fn a_model_is_shown_without_pictures_that_cannot_be_read() {
             assert!(said.contains("the material \"q\" of a.obj is shown without it"), "{said}");
             assert!(picture(&dir, "a.obj") == expected, "{maps}{content:?}");
         }
-        // It stays an input, and who asks for the model as a whole is refused.
+        // It stays an input, and commands that need the whole model fail.
         let said = dir.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
         assert!(said.contains("cannot write kd.png"), "{said}");
         assert_eq!(dir.bytes("kd.png"), b"no picture");
         assert!(dir.expect("check a.obj", 2).contains("kd.png"));
     }
-    // Of glTF too: images that are files, and images inside.
+    // The same for glTF: images in files, and embedded images.
     let plain = |glb: Vec<u8>| {
         dir.write("a.glb", glb);
         picture(&dir, "a.glb")
@@ -674,7 +671,7 @@ fn a_model_is_shown_without_pictures_that_cannot_be_read() {
 }
 
 #[test]
-fn a_picture_of_a_model_says_how_it_was_seen() {
+fn model_image_records_its_view() {
     let dir = TestDir::new();
     dir.write("a.obj", box_of([1, 2, 3]));
     dir.expect(&format!("a.obj {SMALL} --from left --up z -o a.png"), 0);
@@ -687,7 +684,7 @@ fn a_picture_of_a_model_says_how_it_was_seen() {
 }
 
 #[test]
-fn a_model_that_would_be_replaced_is_called_a_model() {
+fn model_is_never_an_output() {
     let dir = TestDir::new();
     dir.write("a.obj", box_of([1, 2, 3]));
     std::os::unix::fs::symlink("a.obj", dir.path("a.png")).expect("a link");

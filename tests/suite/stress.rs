@@ -1,5 +1,6 @@
-//! The short cases of `cargo bench --bench stress`, and the pairs of `cargo bench --bench skips`: pictures within their bounds of
-//! their twins, every sample finite, the same bits and the same rays. Only the benchmarks measure times.
+//! The short cases of `cargo bench --bench stress`, and the pairs of `cargo bench --bench skips`: images within the
+//! bounds of their plain references, only finite samples, the same bits and the same rays. Only the benchmarks measure
+//! times.
 
 #[path = "../../benches/stress/cases/mod.rs"]
 mod cases;
@@ -8,16 +9,16 @@ mod frame;
 #[path = "../../benches/skips/pairs.rs"]
 mod pairs;
 #[path = "../../benches/stress/row.rs"]
-#[allow(dead_code, reason = "times are for the benchmark")]
+#[allow(dead_code, reason = "only the benchmark needs times")]
 mod row;
 #[path = "../../benches/stress/run.rs"]
-#[allow(dead_code, reason = "times are for the benchmark")]
+#[allow(dead_code, reason = "only the benchmark needs times")]
 mod run;
 
 use row::CaseSet;
 
 #[test]
-fn the_ends_of_what_scenes_may_be_look_as_their_plain_twins() {
+fn extreme_scenes_match_their_references() {
     let rows = cases::rows(CaseSet::Short);
     assert!(rows.len() > 60, "{} rows", rows.len());
     let mut wrong = Vec::new();
@@ -37,11 +38,11 @@ fn the_ends_of_what_scenes_may_be_look_as_their_plain_twins() {
 }
 
 #[test]
-fn what_a_scene_does_not_use_changes_no_bit() {
+fn unused_features_change_no_bit() {
     let mut wrong = Vec::new();
     for pair in pairs::pairs([32, 24, 4]) {
         let [off, on] = [&pair.off, &pair.on].map(|picture| run::render(picture).expect(pair.name));
-        assert!(off.pixels.iter().any(|&x| x > 0.0), "{}: all is black", pair.name);
+        assert!(off.pixels.iter().any(|&x| x > 0.0), "{}: the image is black", pair.name);
         if !off.pixels.iter().map(|x| x.to_bits()).eq(on.pixels.iter().map(|x| x.to_bits())) {
             wrong.push(format!("{}: other bits", pair.name));
         }

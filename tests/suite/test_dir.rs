@@ -1,10 +1,12 @@
-//! Common helpers of the tests that run the program as a process.
+//! Helpers for tests that run the program as a process.
 
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command as Process, Output, Stdio};
 
-/// The program that the tests were built with.
+use nix::errno::Errno;
+
+/// The program built with these tests.
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
 
 /// A sphere under a point light.
@@ -32,7 +34,7 @@ position = [1, 3, 2]
 intensity = [10, 10, 10]
 "#;
 
-/// A folder with a scene, in which the program is called.
+/// A temporary directory with a scene, in which the program runs.
 pub(crate) struct TestDir(pub(crate) tempfile::TempDir);
 
 impl TestDir {
@@ -50,8 +52,8 @@ impl TestDir {
         fs::write(self.path(name), content).expect("written");
     }
 
-    /// A copy of the program, for another user, who may not reach where the program is. Another process makes it: in this one,
-    /// the file could still be open for writing in a program that another test just starts, and would not run.
+    /// Copies the program for another user who may not read the build directory. `cp` makes the copy: if this process
+    /// wrote it, a child that another test forks could hold the file open for writing, and executing it would fail.
     pub(crate) fn program(&self) -> PathBuf {
         let copy = self.path("program");
         let made = Process::new("cp").arg(PROGRAM).arg(&copy).status();
@@ -70,18 +72,18 @@ impl TestDir {
         self.glimt(line).output().expect("it runs")
     }
 
-    /// Runs it; checks the exit code and that stdout is empty, and returns stderr.
+    /// Runs `line`, checks the exit code and that stdout is empty, and returns stderr.
     #[track_caller]
     pub(crate) fn expect(&self, line: &str, code: i32) -> String {
         let output = self.run(line);
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(code), "{line}\n{stderr}");
-        assert!(output.stdout.is_empty(), "{line}: nothing belongs on stdout");
-        assert!(!stderr.contains('\u{1b}'), "{line}: no escape sequence without a terminal");
+        assert!(output.stdout.is_empty(), "{line}: stdout is not empty");
+        assert!(!stderr.contains('\u{1b}'), "{line}: escape sequence without a terminal");
         stderr
     }
 
-    /// Runs it as [`Self::expect`] with exit code 0; returns the report.
+    /// Runs `line` as [`Self::expect`] does with exit code 0, and returns the report.
     #[track_caller]
     pub(crate) fn report(&self, line: &str) -> serde_json::Value {
         self.expect(&format!("{line} --once --report report.json"), 0);
@@ -93,4 +95,27 @@ impl TestDir {
     pub(crate) fn bytes(&self, name: &str) -> Vec<u8> {
         fs::read(self.path(name)).expect("a file")
     }
+}
+
+/// Whether a message contains a fact (a file, an option, a key, a number) as a separate word.
+pub(crate) fn mentions(message: &str, fact: &str) -> bool {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let is_inside = |c: char| fact.starts_with(is_word) && is_word(c);
+    let continues = |c: char| fact.ends_with(is_word) && is_word(c);
+    message.match_indices(fact).any(|(at, _)| {
+        !message[..at].ends_with(is_inside) && !message[at + fact.len()..].starts_with(continues)
+    })
+}
+
+/// Checks that a message contains these facts, whatever its wording.
+#[track_caller]
+pub(crate) fn assert_mentions(message: &str, facts: &[&str]) {
+    for fact in facts {
+        assert!(mentions(message, fact), "`{fact}` is missing in: {message}");
+    }
+}
+
+/// The words for an error of the operating system, as messages contain them.
+pub(crate) fn system_error(error: Errno) -> String {
+    glimt::system::describe_error(&std::io::Error::from_raw_os_error(error as i32))
 }

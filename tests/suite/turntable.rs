@@ -1,4 +1,4 @@
-//! `--turntable`: pictures all around a scene or a model.
+//! `--turntable`: frames all around a scene or a model.
 
 use std::io::Cursor;
 use std::process::Stdio;
@@ -11,7 +11,7 @@ use super::test_dir::TestDir;
 
 const SMALL: &str = "--once --width 32 --height 24 --samples 2 --error 0";
 
-/// Four balls of different colours around a point, one on each side.
+/// Four balls of different colors around a point, one on each side.
 fn around() -> TestDir {
     let dir = TestDir::new();
     let ball = |name: &str, color: &str, center: &str| {
@@ -32,7 +32,7 @@ fn around() -> TestDir {
     dir
 }
 
-/// The pixel in the middle of a picture of 32 × 24.
+/// The pixel at the center of an image of 32 × 24.
 fn middle(rgb: &[u8]) -> [u8; 3] {
     let at = 3 * (12 * 32 + 16);
     [rgb[at], rgb[at + 1], rgb[at + 2]]
@@ -55,7 +55,7 @@ fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn the_camera_goes_around_in_numbered_files_and_in_one_that_moves() {
+fn turntable_writes_files_and_animations() {
     let dir = around();
     let stderr =
         dir.expect(&format!("around.toml {SMALL} --turntable 4 -o a_####.png -o a.apng -o a.gif"), 0);
@@ -71,13 +71,13 @@ fn the_camera_goes_around_in_numbered_files_and_in_one_that_moves() {
     assert!(dir.bytes("a.gif").starts_with(b"GIF89a"));
     assert_eq!(stderr.matches("wrote a_0003.png").count(), 1, "{stderr}");
     assert!(stderr.contains("wrote a.gif (32×24, 4 frames)"), "{stderr}");
-    // The first one is the picture of the call without it.
+    // The first frame equals the image without the option.
     dir.expect(&format!("around.toml {SMALL} -o single.png"), 0);
     assert_eq!(picture(&dir, "single.png"), picture(&dir, "a_0001.png"));
 }
 
 #[test]
-fn files_and_trees_and_photons_are_made_once() {
+fn turntable_reuses_trees_and_photons() {
     let dir = TestDir::new();
     dir.write("knot.obj", std::fs::read("assets/knot.obj").expect("a mesh"));
     dir.write(
@@ -104,7 +104,7 @@ fn files_and_trees_and_photons_are_made_once() {
 }
 
 #[test]
-fn a_model_stays_in_the_frame() {
+fn model_stays_in_the_frame() {
     let dir = TestDir::new();
     // A long plank, seen from its end first.
     dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nv -1 2 8\nv 0 3 0\nf 1 2 3 4\nf 1 2 5\nf 3 4 5\n");
@@ -112,13 +112,13 @@ fn a_model_stays_in_the_frame() {
     for frame in frames(&dir.bytes("b.apng")) {
         let row = |y: usize| frame[3 * 32 * y..3 * 32 * (y + 1)].to_vec();
         let pixel = |y: usize, x: usize| row(y)[3 * x..3 * x + 3].to_vec();
-        // The ground's colour is at both edges of every row.
-        assert!((4..20).all(|y| pixel(y, 0) == pixel(y, 31)), "the model is not cut off");
+        // Both edges of every row show the ground.
+        assert!((4..20).all(|y| pixel(y, 0) == pixel(y, 31)), "the model is cut off");
     }
 }
 
 #[test]
-fn what_a_turntable_cannot_be_is_refused_before_the_work() {
+fn impossible_turntables_are_rejected() {
     let dir = TestDir::new();
     let says = |line: &str, words: &str| {
         let stderr = dir.expect(&format!("ball.toml {line}"), 2);
@@ -135,7 +135,7 @@ fn what_a_turntable_cannot_be_is_refused_before_the_work() {
     says("--once --turntable 4 -o a_#.gif -o a_#.xyz", ".xyz is not a format");
     says("--once --turntable 4 -o a_#.png -o a_#.png", "given twice");
     says("--once --turntable 11 -o a_#.png -o a_1#.png", "a_11.png would hold two pictures");
-    // A later picture would replace an input: nothing is rendered.
+    // A later frame would replace an input: nothing is rendered.
     dir.write("a3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
     let scene = format!("{}[textures.t]\nfile = \"a3.png\"\n", super::test_dir::SCENE);
     dir.write("uses.toml", scene);
@@ -150,7 +150,7 @@ fn what_a_turntable_cannot_be_is_refused_before_the_work() {
 }
 
 #[test]
-fn pictures_that_are_one_file_by_a_link_are_found_before_the_work() {
+fn frames_linked_to_one_file_are_rejected() {
     let dir = around();
     std::os::unix::fs::symlink("a_3.png", dir.path("a_1.png")).expect("a link");
     dir.write("a_3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
@@ -159,9 +159,9 @@ fn pictures_that_are_one_file_by_a_link_are_found_before_the_work() {
     assert!(!dir.path("a_2.png").exists());
 }
 
-/// Without a name they are those of the scene, and replace only what glimt wrote.
+/// Default names come from the scene, and replace only files that glimt wrote.
 #[test]
-fn default_names_replace_no_foreign_picture() {
+fn default_frames_replace_no_foreign_image() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --turntable 2", 0);
     dir.expect("ball.toml --once --turntable 2 --seed 4", 0);
@@ -171,14 +171,14 @@ fn default_names_replace_no_foreign_picture() {
     let stderr = dir.expect("ball.toml --once --turntable 2 --seed 5", 2);
     assert!(stderr.contains("cannot write ball_0002.png"), "{stderr}");
     assert_eq!(dir.bytes("ball_0002.png"), foreign);
-    // A name in the scene is that of a single picture.
+    // A name in the scene is for a single image.
     dir.write("named.toml", super::test_dir::SCENE.replace("samples = 2", "samples = 2\noutput = \"x.png\""));
     dir.expect("named.toml --once --turntable 2", 0);
     assert!(dir.path("x_0001.png").exists() && !dir.path("x.png").exists());
 }
 
 #[test]
-fn an_interrupted_turntable_leaves_whole_files_only() {
+fn interrupted_turntable_leaves_whole_files() {
     let dir = around();
     let line = "around.toml --once --width 64 --height 48 --samples 1000 --error 0 --turntable 5000 -o a_#.png -o a.gif";
     let mut process = dir.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
@@ -194,12 +194,12 @@ fn an_interrupted_turntable_leaves_whole_files_only() {
         .map(|entry| entry.expect("a file").file_name().into_string().expect("UTF-8"))
         .collect();
     let pictures: Vec<&String> = names.iter().filter(|name| name.ends_with(".png")).collect();
-    assert_eq!(pictures.len() + 2, names.len(), "nothing else is there: {names:?}");
+    assert_eq!(pictures.len() + 2, names.len(), "unexpected files: {names:?}");
     pictures.iter().for_each(|name| assert_eq!(picture(&dir, name).len(), 64 * 48 * 3));
 }
 
 #[test]
-fn a_scene_that_changes_on_the_way_ends_its_turntable() {
+fn changed_scene_ends_the_turntable() {
     let dir = around();
     let line =
         "around.toml --once --width 64 --height 48 --samples 200 --error 0 --turntable 5000 -o a_#.png";
@@ -218,7 +218,7 @@ fn a_scene_that_changes_on_the_way_ends_its_turntable() {
 }
 
 #[test]
-fn pictures_of_a_longer_turntable_before_are_named_and_stay() {
+fn frames_of_a_longer_turntable_are_kept() {
     let dir = around();
     assert!(!dir.expect(&format!("around.toml {SMALL} --turntable 4 -o w_##.png"), 0).contains("longer"));
     let third = dir.bytes("w_03.png");
@@ -227,9 +227,9 @@ fn pictures_of_a_longer_turntable_before_are_named_and_stay() {
     assert_eq!(dir.bytes("w_03.png"), third);
 }
 
-/// `output` in `[render]` names no pictures of a turntable, and a model has none.
+/// `output` in `[render]` does not name a turntable's frames, and a model has no such key.
 #[test]
-fn the_way_out_of_a_foreign_picture_is_one_that_the_call_takes() {
+fn foreign_image_hint_is_a_valid_option() {
     let dir = TestDir::new();
     dir.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nf 1 2 3\n");
     let foreign = std::fs::read("assets/textures/checker.png").expect("an image");

@@ -2,16 +2,16 @@
 
 use super::test_dir::TestDir;
 
-/// Red, green and blue of each pixel of a float picture.
+/// Red, green and blue of each pixel of a float image.
 fn floats(dir: &TestDir, name: &str) -> Vec<[f32; 3]> {
     let picture = image::open(dir.path(name)).expect("a float picture").into_rgb32f();
     picture.pixels().map(|pixel| pixel.0).collect()
 }
 
 #[test]
-fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
+fn bundled_scene_components_add_up() {
     let dir = TestDir::new();
-    // But for a million triangles, whose mesh is generated first.
+    // Except the million triangles, whose mesh is generated.
     for scene in [
         "cornell",
         "cornell_glass",
@@ -50,17 +50,17 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
                 );
             }
         }
-        assert!(beauty.iter().any(|pixel| pixel[0] > 0.01), "{scene}: something is seen");
+        assert!(beauty.iter().any(|pixel| pixel[0] > 0.01), "{scene}: the image is not black");
     }
 }
 
 #[test]
-fn depth_is_a_distance_in_float_files_and_stretched_in_others() {
+fn depth_is_metric_only_in_float_files() {
     let dir = TestDir::new();
     dir.expect("ball.toml --once --samples 16 --view depth -o depth.exr -o depth.png", 0);
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
-    // The ball's front is 3.5 before the camera, its rim a little nearer than its middle at 4; behind it there is
-    // nothing.
+    // The ball's front is 3.5 in front of the camera, its rim a little nearer than its center at 4; there is nothing
+    // behind it.
     let middle = depths[12 * 32 + 16];
     assert!((middle - 3.505).abs() < 0.006, "{middle}");
     assert_eq!(depths[0], 0.0);
@@ -86,7 +86,7 @@ fn notes(dir: &TestDir, name: &str) -> Vec<(String, String)> {
 }
 
 #[test]
-fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
+fn infinite_floor_keeps_near_depth_contrast() {
     let dir = TestDir::new();
     let floor = "[[plane]]\nnormal = [0, 1, 0]\npoint = [0, 0.4, 0]\nmaterial = \"ball\"\n";
     dir.write("floor.toml", format!("{}{floor}", super::test_dir::SCENE));
@@ -95,11 +95,11 @@ fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
     let depths: Vec<f32> = floats(&dir, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     assert!(near < 2.0 && far > 10.0, "{near} {far}");
-    // Pixels at the border of empty space do not count, as there are farther ones.
+    // Pixels at the border of empty space are excluded, because farther ones exist.
     let end = far as f32;
     assert!(depths.iter().any(|&depth| depth > end) && depths.contains(&end));
     assert!(notes(&dir, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));
-    // The ball at 3.5 and the floor beside it at 5.7: straight they would be 37 shades apart.
+    // The ball at 3.5 and the floor next to it at 5.7 would differ by 37 shades on a linear scale.
     let shown = image::open(dir.path("depth.png")).expect("a picture").into_rgb8();
     let at = |x, y| i32::from(shown.get_pixel(x, y).0[0]);
     assert!(at(16, 13) - at(2, 15) > 42, "{} {}", at(16, 13), at(2, 15));
@@ -108,7 +108,7 @@ fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
 }
 
 #[test]
-fn samples_and_errors_are_told_of_each_pixel() {
+fn sample_and_error_views_are_per_pixel() {
     let dir = TestDir::new();
     let report = dir.report("ball.toml --samples 5 --view samples -o samples.exr -o samples.png");
     assert_eq!(report["image"]["range"], serde_json::json!([0.0, 5.0]));
@@ -117,7 +117,7 @@ fn samples_and_errors_are_told_of_each_pixel() {
     assert!(white.pixels().all(|pixel| pixel.0 == [255; 3]));
     dir.expect("ball.toml --once --samples 16 --view error -o error.exr", 0);
     let errors = floats(&dir, "error.exr");
-    assert_eq!(errors[0], [0.0; 3], "where all samples are alike nothing is in doubt");
-    assert!(errors.iter().any(|pixel| pixel[0] > 1e-3), "the border of the ball is");
+    assert_eq!(errors[0], [0.0; 3], "equal samples have no error");
+    assert!(errors.iter().any(|pixel| pixel[0] > 1e-3), "the ball's border has an error");
     assert!(errors.iter().all(|pixel| pixel[0].is_finite() && pixel[0] < 0.5));
 }

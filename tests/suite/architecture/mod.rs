@@ -147,7 +147,7 @@ const EXEMPT: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/pace.rs"];
 const SIMD: &str = "accel/wide_bvh/simd";
 
 #[test]
-fn images_do_not_depend_on_the_system_s_libm() {
+fn images_do_not_depend_on_libm() {
     let mut found = Vec::new();
     for (file, path) in all_sources() {
         let is_test = path.to_str().is_some_and(|path| path.contains("tests"));

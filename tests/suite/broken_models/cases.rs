@@ -1,23 +1,23 @@
-//! Broken mesh and material files.
+//! Malformed mesh and material files.
 
-/// The fault, the file, and the message; no message if the file is read as far as it goes.
+/// The fault, the file, and the message; without a message, the valid part of the file is read.
 pub(super) type Case = (&'static str, Vec<u8>, &'static str);
 
 /// A facet of a binary STL file.
 const FACET: [u8; 50] = {
     let mut facet = [0; 50];
-    // The second corner is at (1, 0, 0), the third one at (0, 1, 0).
+    // The second vertex is at (1, 0, 0), the third at (0, 1, 0).
     (facet[26], facet[27]) = (0x80, 0x3f);
     (facet[42], facet[43]) = (0x80, 0x3f);
     facet
 };
 
-/// Every byte, four times.
+/// Repeats every byte four times.
 pub(super) fn every_byte() -> Vec<u8> {
     (0..1024_u32).map(|index| index as u8).collect()
 }
 
-/// A binary STL file that claims so many facets.
+/// A binary STL file that claims `claimed` facets.
 fn stl_of(claimed: u32, facets: &[u8]) -> Vec<u8> {
     [&[0; 80][..], &claimed.to_le_bytes(), facets].concat()
 }
@@ -25,7 +25,7 @@ fn stl_of(claimed: u32, facets: &[u8]) -> Vec<u8> {
 pub(super) fn obj() -> Vec<Case> {
     vec![
         (
-            "a face of a missing vertex",
+            "a face with a missing vertex",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n".to_vec(),
             "a.obj:4: vertex 4 is out of range: there are 3, from 1",
         ),
@@ -35,7 +35,7 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj:4: vertex 0 is out of range: there are 3, from 1",
         ),
         (
-            "a vertex before the first",
+            "a vertex index before the first",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n".to_vec(),
             "a.obj:4: vertex -4 is out of range: there are 3, from 1",
         ),
@@ -47,7 +47,7 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj:1: expected 3 coordinates, found \"zero\"",
         ),
         (
-            "a vertex of two numbers",
+            "a vertex with two coordinates",
             b"v 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec(),
             "a.obj:1: expected 3 coordinates, found 2",
         ),
@@ -57,17 +57,17 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj: no usable face: of 1, 1 have a corner that is not finite and 0 have no area",
         ),
         (
-            "a face of two corners",
+            "a face with two vertices",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n".to_vec(),
             "a.obj: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
         ),
         (
-            "a face without corners",
+            "a face without vertices",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf\n".to_vec(),
             "a.obj: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
         ),
         (
-            "a face at one point",
+            "a face with three equal vertices",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 1\n".to_vec(),
             "a.obj: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
         ),
@@ -79,7 +79,7 @@ pub(super) fn obj() -> Vec<Case> {
             "a.obj:4: expected a corner like 1/2/3, found \"one\"",
         ),
         (
-            "an index beyond 64 bits",
+            "an index that overflows 64 bits",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999999\n".to_vec(),
             "a.obj:4: expected a corner like 1/2/3, found \"99999999999999999999\"",
         ),
@@ -114,55 +114,55 @@ pub(super) fn obj() -> Vec<Case> {
 
 pub(super) fn off() -> Vec<Case> {
     vec![
-        ("nothing but the name", b"OFF\n".to_vec(), "a.off:1: the file ends before the number of vertices"),
+        ("only the keyword", b"OFF\n".to_vec(), "a.off:1: the file ends before the number of vertices"),
         (
-            "a word for a count",
+            "a word instead of a count",
             b"OFF\nmany 1 0\n".to_vec(),
             "a.off:2: expected the number of vertices, found \"many\"",
         ),
         ("a negative count", b"OFF\n-3 1 0\n".to_vec(), "a.off:2: the number of vertices is -3"),
         (
-            "four thousand million vertices",
+            "four billion vertices",
             b"OFF\n4000000000 1 0\n0 0 0\n".to_vec(),
             "a.off:2: the header claims 4000000000 vertices and 1 face, and only 6 bytes follow",
         ),
         (
-            "four thousand million faces",
+            "four billion faces",
             b"OFF\n3 4000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
             "a.off:2: the header claims 3 vertices and 4000000000 faces, and only 26 bytes follow",
         ),
         (
-            "it ends in the vertices",
+            "the file ends within the vertices",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n".to_vec(),
             "a.off:2: the header claims 3 vertices and 1 face, and only 12 bytes follow",
         ),
         (
-            "it ends in the faces",
+            "the file ends within the faces",
             b"OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
             "a.off:7: the file ends after 1 of 2 faces",
         ),
         (
-            "a corner that is missing",
+            "a missing vertex",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(),
             "a.off:6: vertex 3 is out of range: there are 3, from 0",
         ),
         (
-            "a corner before the first",
+            "a vertex index before the first",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(),
             "a.off:6: vertex -1 is out of range: there are 3, from 0",
         ),
         (
-            "a face with fewer corners than it says",
+            "a face with fewer vertices than declared",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n".to_vec(),
             "a.off:6: a face claims 4 corners, more than the file can hold",
         ),
         (
-            "a face of a thousand million corners",
+            "a face with a billion vertices",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n1000000000 0 1 2\n".to_vec(),
             "a.off:6: a face claims 1000000000 corners, more than the file can hold",
         ),
         (
-            "a face of two corners",
+            "a face with two vertices",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n".to_vec(),
             "a.off: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
         ),
@@ -172,7 +172,7 @@ pub(super) fn off() -> Vec<Case> {
             "a.off:3: expected a coordinate, found \"x\"",
         ),
         (
-            "two numbers in a vertex",
+            "a vertex with two coordinates",
             b"OFF\n3 1 0\n0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
             "a.off:3: expected a coordinate, found the line's end",
         ),
@@ -208,53 +208,53 @@ pub(super) fn off() -> Vec<Case> {
 
 pub(super) fn ply() -> Vec<Case> {
     vec![
-        ("only the first line", b"ply\n".to_vec(), "a.ply: the header has no end_header"),
-        ("no end of the header", b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(), "a.ply: the header has no end_header"),
+        ("only the magic line", b"ply\n".to_vec(), "a.ply: the header has no end_header"),
+        ("a header without an end", b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(), "a.ply: the header has no end_header"),
         ("an unknown format", b"ply\nformat morse 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:2: the format is ascii, binary_little_endian or binary_big_endian, not \"morse\""),
         ("version 2", b"ply\nformat ascii 2.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), ""),
         ("an unknown type", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty quad x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:4: \"quad\" is no type of PLY"),
         ("no x", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the vertices have no x, y and z"),
         ("a negative count", b"ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:3: \"-3\" is no number of vertex"),
-        ("four thousand million vertices", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 times the element `vertex`, and only 26 bytes follow"),
-        ("four thousand million faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 times the element `face`, and only 9 bytes follow"),
-        ("it ends in the vertices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n".to_vec(), "a.ply: the header claims 3 times the element `vertex`, and only 12 bytes follow"),
-        ("it ends in the faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:14: face 2: the file ends here"),
-        ("a corner that is missing", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(), "a.ply:13: face 1: vertex 3 is out of range: there are 3, from 0"),
-        ("a corner before the first", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(), "a.ply:13: face 1: vertex -1 is out of range: there are 3, from 0"),
-        ("a list of a negative length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n-1\n".to_vec(), "a.ply:13: face 1: the length of a list is -1"),
-        ("a list of four thousand million", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: it claims 4294967295 corners, more than the file can hold"),
-        ("faces without a list", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the faces have no list of whole numbers `vertex_indices`"),
+        ("four billion vertices", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 times the element `vertex`, and only 26 bytes follow"),
+        ("four billion faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 times the element `face`, and only 9 bytes follow"),
+        ("the file ends within the vertices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n".to_vec(), "a.ply: the header claims 3 times the element `vertex`, and only 12 bytes follow"),
+        ("the file ends within the faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:14: face 2: the file ends here"),
+        ("a missing vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(), "a.ply:13: face 1: vertex 3 is out of range: there are 3, from 0"),
+        ("a vertex index before the first", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(), "a.ply:13: face 1: vertex -1 is out of range: there are 3, from 0"),
+        ("a list with a negative length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n-1\n".to_vec(), "a.ply:13: face 1: the length of a list is -1"),
+        ("a list of four billion", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: it claims 4294967295 corners, more than the file can hold"),
+        ("faces without vertex indices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the faces have no list of whole numbers `vertex_indices`"),
         ("words in a vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:10: vertex 1: expected a number, found \"x\""),
         ("no faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n".to_vec(), "a.ply: no usable face: the file has none"),
-        ("a property before an element", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n".to_vec(), "a.ply:3: a property before the first element"),
+        ("a property before any element", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n".to_vec(), "a.ply:3: a property before the first element"),
         ("an element without a count", b"ply\nformat ascii 1.0\nelement vertex\nend_header\n".to_vec(), "a.ply:3: \"element\" is no statement of a PLY header"),
-        ("a list of fractions", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list is a whole number"),
+        ("a list with a fractional length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list is a whole number"),
         ("bytes", every_byte(), "a.ply:1: this is a binary file of another kind"),
     ]
 }
 
 pub(super) fn stl() -> Vec<Case> {
     vec![
-        ("only the first word", b"solid\n".to_vec(), "a.stl: no usable face: the file has none"),
+        ("only the first keyword", b"solid\n".to_vec(), "a.stl: no usable face: the file has none"),
         ("no facets", b"solid a\nendsolid a\n".to_vec(), "a.stl: no usable face: the file has none"),
         ("no count", vec![0; 82], "a.stl:1: this is a binary file of another kind"),
-        ("no facets at all", stl_of(0, &[]), "a.stl:1: this is a binary file of another kind"),
-        ("four thousand million facets", stl_of(4000000000, &FACET), "a.stl: the header claims 4000000000 facets, and the file ends after 1 of them"),
-        ("it ends in a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facets, and the file ends after 0 of them"),
-        ("one facet less than it says", stl_of(2, &FACET), "a.stl: the header claims 2 facets, and the file ends after 1 of them"),
-        ("facets at one point", stl_of(1, &[0; 50]), "a.stl: no usable face: of 1, 0 have a corner that is not finite and 1 have no area"),
+        ("no facets", stl_of(0, &[]), "a.stl:1: this is a binary file of another kind"),
+        ("four billion facets", stl_of(4000000000, &FACET), "a.stl: the header claims 4000000000 facets, and the file ends after 1 of them"),
+        ("the file ends within a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facets, and the file ends after 0 of them"),
+        ("one facet fewer than declared", stl_of(2, &FACET), "a.stl: the header claims 2 facets, and the file ends after 1 of them"),
+        ("a facet with three equal vertices", stl_of(1, &[0; 50]), "a.stl: no usable face: of 1, 0 have a corner that is not finite and 1 have no area"),
         ("not finite", stl_of(1, &[0xff; 50]), "a.stl: no usable face: of 1, 1 have a corner that is not finite and 0 have no area"),
         ("words in a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:5: expected a coordinate, found \"zero\""),
-        ("two numbers in a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: expected a coordinate, found \"vertex\""),
+        ("a vertex with two coordinates", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: expected a coordinate, found \"vertex\""),
         ("two corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: a loop of 2 corners"),
         ("four corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), ""),
         ("no loop", b"solid a\nfacet normal 0 0 1\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:3: a vertex outside of \"outer loop\" and \"endloop\""),
-        ("it ends in a loop", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n".to_vec(), "a.stl:6: the file ends in a facet"),
-        ("it ends in a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0".to_vec(), "a.stl:4: the file ends in a vertex"),
+        ("the file ends within a loop", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n".to_vec(), "a.stl:6: the file ends in a facet"),
+        ("the file ends within a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0".to_vec(), "a.stl:4: the file ends in a vertex"),
         ("an unknown word", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendlop\nendfacet\nendsolid a\n".to_vec(), "a.stl:7: expected a keyword of STL, found \"endlop\""),
         ("a vertex outside a facet", b"solid a\nvertex 0 0 0\nendsolid a\n".to_vec(), "a.stl:2: a vertex outside of \"outer loop\" and \"endloop\""),
         ("a facet within a facet", b"solid a\nfacet normal 0 0 1\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), ""),
-        ("too large for the format", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e999 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl: no usable face: of 1, 1 have a corner that is not finite and 0 have no area"),
+        ("a coordinate that overflows", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e999 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl: no usable face: of 1, 1 have a corner that is not finite and 0 have no area"),
         ("bytes", every_byte(), "a.stl: the header claims 1397903696 facets, and the file ends after 18 of them"),
     ]
 }
@@ -268,17 +268,17 @@ pub(super) fn mtl() -> Vec<Case> {
             "a.mtl:1: `newmtl` is followed by a name",
         ),
         (
-            "words in a colour",
+            "words in a color",
             b"newmtl m\nKd red green blue\n".to_vec(),
             "a.mtl:2: `Kd` is followed by three finite numbers",
         ),
         (
-            "a colour of two numbers",
+            "a color with two components",
             b"newmtl m\nKd 1 1\n".to_vec(),
             "a.mtl:2: `Kd` is followed by three finite numbers",
         ),
         (
-            "a colour without numbers",
+            "a color without components",
             b"newmtl m\nKd\n".to_vec(),
             "a.mtl:2: `Kd` is followed by three finite numbers",
         ),
@@ -289,15 +289,15 @@ pub(super) fn mtl() -> Vec<Case> {
         ),
         ("a negative colour", b"newmtl m\nKd -1 1 1\n".to_vec(), ""),
         (
-            "an exponent with words",
+            "a word as an exponent",
             b"newmtl m\nNs shiny\n".to_vec(),
             "a.mtl:2: `Ns` is followed by a finite number",
         ),
         ("a negative exponent", b"newmtl m\nKd 1 1 1\nNs -5\n".to_vec(), ""),
-        ("an index of refraction of 0", b"newmtl m\nNi 0\nillum 7\n".to_vec(), ""),
+        ("index of refraction 0", b"newmtl m\nNi 0\nillum 7\n".to_vec(), ""),
         ("an unknown model", b"newmtl m\nillum 99\n".to_vec(), ""),
         (
-            "a model with words",
+            "a word as an illumination model",
             b"newmtl m\nillum glass\n".to_vec(),
             "a.mtl:2: `illum` is followed by a whole number",
         ),
@@ -306,14 +306,14 @@ pub(super) fn mtl() -> Vec<Case> {
             b"newmtl m\nmap_Kd\n".to_vec(),
             "a.mtl:2: `map_Kd` is followed by a file",
         ),
-        ("a material that is not there", b"newmtl other\nKd 1 1 1\n".to_vec(), ""),
+        ("a missing material", b"newmtl other\nKd 1 1 1\n".to_vec(), ""),
         (
-            "an opacity with words",
+            "a word as an opacity",
             b"newmtl m\nd opaque\n".to_vec(),
             "a.mtl:2: `d` is followed by a finite number",
         ),
         (
-            "a roughness with words",
+            "a word as a roughness",
             b"newmtl m\nPr smooth\n".to_vec(),
             "a.mtl:2: `Pr` is followed by a finite number",
         ),

@@ -1,5 +1,5 @@
-//! Broken and hostile models, some twenty of each format: each is an error that names the file and the place, or it is read. None
-//! takes more memory than its length allows.
+//! Malformed and hostile models, about twenty per format: each is either read or rejected with an error that names the
+//! file and the position. None uses more memory than its size justifies.
 
 mod cases;
 
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use self::cases::{every_byte, mtl, obj, off, ply, stl};
 
-/// A place in the JSON, what stands there then, and words of the message.
+/// A JSON pointer, the value to put there, and text of the expected message.
 const EDITS: &[(&str, &str, &str)] = &[
     ("/asset/version", r#""1.0""#, r#"it is glTF 1.0; version 2 is read"#),
     ("/nodes/0/mesh", r#"7"#, r#"nodes[0]: meshes[7] does not exist: there are 1"#),
@@ -84,7 +84,7 @@ fn triangle() -> Value {
     })
 }
 
-/// The message about a file in a folder, with the file's name alone; empty if it is read.
+/// The error for a file in a folder, with only the file's name; empty if the file is read.
 fn said(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");
@@ -155,7 +155,7 @@ fn gltf_files() {
     }
 }
 
-/// Chunks of GLB files: header, JSON and binary chunk with what they claim.
+/// The chunks of a GLB file, each with the length it claims.
 #[test]
 fn glb_files() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -184,12 +184,12 @@ fn glb_files() {
     let cases: Vec<(&str, Vec<u8>, String)> = vec![
         ("whole", all.clone(), String::new()),
         (
-            "an unknown chunk before",
+            "an unknown chunk first",
             file(head, &[own.clone(), chunk(b"MINE", 4, b"abcd"), rest.clone()]),
             String::new(),
         ),
         ("two of each", file(head, &[own.clone(), rest.clone(), own.clone(), rest.clone()]), String::new()),
-        ("only the first word", b"glTF".to_vec(), "a.glb: the file ends in its header".to_owned()),
+        ("only the magic number", b"glTF".to_vec(), "a.glb: the file ends in its header".to_owned()),
         ("half a version", b"glTF\x02\0".to_vec(), "a.glb: the file ends in its header".to_owned()),
         (
             "version 1",
@@ -202,22 +202,22 @@ fn glb_files() {
             "a.glb: it is GLB of version 4294967295; version 2 is read".to_owned(),
         ),
         ("no chunk", head.to_vec(), "a.glb: it has no JSON".to_owned()),
-        ("half a header of a chunk", file(head, &[own[..6].to_vec()]), "a.glb: it has no JSON".to_owned()),
+        ("half a chunk header", file(head, &[own[..6].to_vec()]), "a.glb: it has no JSON".to_owned()),
         ("no JSON", file(head, std::slice::from_ref(&rest)), "a.glb: it has no JSON".to_owned()),
         (
-            "an unknown chunk alone",
+            "only an unknown chunk",
             file(head, &[chunk(b"MINE", 4, b"abcd")]),
             "a.glb: it has no JSON".to_owned(),
         ),
-        ("2 GiB of JSON", file(head, &[long_text, rest.clone()]), claims(12, has)),
-        ("2 GiB of numbers", file(head, &[own.clone(), long_rest]), claims(place, 44)),
+        ("a claim of 2 GiB of JSON", file(head, &[long_text, rest.clone()]), claims(12, has)),
+        ("a claim of 2 GiB of binary data", file(head, &[own.clone(), long_rest]), claims(place, 44)),
         (
-            "numbers that are cut short",
+            "truncated binary data",
             file(head, &[own.clone(), short]),
             format!("a.glb: the chunk at byte {place} claims 44 bytes, and the file has 40 more"),
         ),
         (
-            "JSON that is cut short",
+            "truncated JSON",
             all[..200].to_vec(),
             format!("a.glb: the chunk at byte 12 claims {} bytes, and the file has 180 more", text.len()),
         ),
@@ -237,7 +237,7 @@ fn glb_files() {
             "a.glb:1: column 8: expected `,` or `}`".to_owned(),
         ),
         (
-            "JSON of no bytes",
+            "an empty JSON chunk",
             file(head, &[empty, rest]),
             "a.glb: it is no glTF: its JSON is no object".to_owned(),
         ),

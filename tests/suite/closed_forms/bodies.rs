@@ -1,5 +1,5 @@
-//! Glass in several open parts. Closed together they are one body; what stays open is named, and looks the same by paths and
-//! photons.
+//! Glass assembled from several open parts. Parts that close together form one solid; anything that stays open is
+//! reported, and looks the same path-traced and with photons.
 
 use glimt::assets::LoadedMesh;
 use glimt::control::CancelToken;
@@ -12,13 +12,13 @@ use super::photons::{assert_same_light, both};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
 use super::{Random, v};
 
-/// The bodies of what is built.
+/// The glass solids of the world that is built.
 fn bodies(build: &Build) -> GlassSolids {
     let meshes: Vec<&LoadedMesh> = build.parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
     GlassSolids::find(&build.scene, &meshes, &CancelToken::new()).expect("nobody cancels")
 }
 
-/// A prism over a polygon in the plane z = 0, counter-clockwise from +z, of which each side is cut into squares.
+/// A prism over a polygon in the plane z = 0, counterclockwise seen from +z, with each side divided into squares.
 fn prism(polygon: &[DVec3], caps: &[[usize; 3]], height: f64, steps: usize) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     let mut put = |corners: [DVec3; 3]| {
@@ -47,7 +47,7 @@ fn prism(polygon: &[DVec3], caps: &[[usize; 3]], height: f64, steps: usize) -> T
     mesh
 }
 
-/// Closed bodies, about 1 in size and above z = 0.
+/// Closed solids, about 1 in size and above z = 0.
 fn closed(round: usize) -> TriangleMesh {
     let corner = |x: f64, y: f64| v(x, y, 0.0);
     match round % 4 {
@@ -76,13 +76,13 @@ fn closed(round: usize) -> TriangleMesh {
     }
 }
 
-/// The triangles of a mesh that hold.
+/// The triangles of a mesh for which `holds` is true.
 fn part(mesh: &TriangleMesh, holds: impl Fn(usize) -> bool) -> TriangleMesh {
     let own = mesh.triangles.iter().enumerate().filter(|&(i, _)| holds(i));
     TriangleMesh { triangles: own.map(|(_, &own)| own).collect(), ..mesh.clone() }
 }
 
-/// Parts around points at random: each triangle is of the nearest.
+/// Divides a mesh around random points: each triangle belongs to the nearest.
 fn cut(mesh: &TriangleMesh, count: usize, random: &mut Random) -> Vec<TriangleMesh> {
     let middle = |i: usize| mesh.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let seeds: Vec<Vec3> =
@@ -99,7 +99,7 @@ fn turned(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh { triangles: mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh.clone() }
 }
 
-/// A floor and a large lamp above it, and the parts between them.
+/// A floor with a large area light above it, and the parts in between.
 fn room(parts: &[TriangleMesh], material: &Material) -> Build {
     let build = scene().quad(v(-6.0, -6.0, -0.1), v(12.0, 0.0, 0.0), v(0.0, 12.0, 0.0), matte(0.7)).quad(
         v(-3.0, 3.0, 4.0),
@@ -116,7 +116,7 @@ fn by_path(build: Build) -> Build {
 }
 
 #[test]
-fn a_body_in_parts_is_the_body() {
+fn solid_in_parts_equals_the_whole() {
     let mut random = Random(11);
     for round in 0..12 {
         let whole = closed(round);
@@ -132,8 +132,8 @@ fn a_body_in_parts_is_the_body() {
             assert!(!found.is_inside_out(part), "round {round}");
         }
         let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
-        assert!(one_path == several_path, "round {round}: {} parts by path", parts.len());
-        // Photons are aimed at each object, so that other objects mean other photons.
+        assert!(one_path == several_path, "round {round}: {} parts, path-traced", parts.len());
+        // Photons are aimed at objects, so different objects get different photons.
         if round < 4 {
             let [one, several] = [one, several].map(|build| build.photons(4000, 0.1));
             assert_same(&format!("photons, round {round}"), &one, &several, 4, 3.5, 0.0);
@@ -142,7 +142,7 @@ fn a_body_in_parts_is_the_body() {
 }
 
 #[test]
-fn a_part_that_looks_the_other_way_is_turned() {
+fn reversed_part_is_flipped() {
     let mut random = Random(5);
     for round in 0..8 {
         let whole = closed(round);
@@ -159,7 +159,7 @@ fn a_part_that_looks_the_other_way_is_turned() {
         for (object, flip) in (2..).zip(&flips) {
             assert_eq!(found.is_inside_out(object), *flip, "round {round}");
         }
-        // Corners in another order round otherwise, and few paths are others.
+        // Reversing the corners rounds differently, so few paths differ.
         let sum = |picture: &[DVec3]| picture.iter().map(|pixel| pixel.y).sum::<f64>();
         let (own, right) = (sum(&by_path(build).picture(8, 3)), sum(&right));
         assert!((own - right).abs() < 1e-3 * right, "round {round}: {flips:?}: {own}, not {right}");
@@ -167,8 +167,8 @@ fn a_part_that_looks_the_other_way_is_turned() {
 }
 
 #[test]
-fn a_long_edge_closes_with_many_short_ones() {
-    // A box whose sides are cut into squares, and whose lids are not; in the world they stand askew.
+fn long_edge_closes_with_many_short_ones() {
+    // A box whose sides are divided into squares and whose lids are not, at an oblique angle to the axes.
     let corners = [v(-0.7, -0.6, 0.0), v(0.7, -0.6, 0.0), v(0.7, 0.6, 0.0), v(-0.7, 0.6, 0.0)];
     let side = |step: f64| v(0.0, 0.0, 0.9 * step);
     let mut sides = TriangleMesh::default();
@@ -201,7 +201,7 @@ fn a_long_edge_closes_with_many_short_ones() {
     assert!((open.missing - 1.68 / (1.68 + 0.9 * 5.2)).abs() < 1e-5, "{}", open.missing);
 }
 
-/// The six quads of a box between two corners; `flips` says which look inwards.
+/// The six quads of a box between two corners; `flips` selects those that face inwards.
 fn quads(low: DVec3, high: DVec3, flips: u32) -> Vec<Shape> {
     let size = high - low;
     let mut quads = Vec::new();
@@ -222,7 +222,7 @@ fn quads(low: DVec3, high: DVec3, flips: u32) -> Vec<Shape> {
 }
 
 #[test]
-fn quads_and_disks_close_bodies() {
+fn quads_and_disks_close_solids() {
     let of =
         |shapes: Vec<Shape>| shapes.into_iter().fold(scene(), |build, shape| build.shape(shape, glass(1.5)));
     for flips in 0..64 {
@@ -235,13 +235,13 @@ fn quads_and_disks_close_bodies() {
     // One is missing.
     let five = bodies(&of(quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0)[1..].to_vec()));
     assert!(five.has_open() && five.open().len() == 4, "{:?}", five.open());
-    // Two boxes that share a face, whose edges meet four quads each, are two bodies.
+    // Two boxes share a face, and four quads meet at each edge of it: these are two solids.
     let (one, other) =
         (quads(v(0.0, 0.0, 0.0), v(1.0, 1.0, 1.0), 0), quads(v(1.0, 0.0, 0.0), v(2.0, 1.0, 1.0), 0));
     let two = bodies(&of([one, other].concat()));
     assert!(two.open().is_empty(), "{:?}", two.open());
     assert_eq!((0..12).map(|quad| two.place(quad)).collect::<Vec<_>>(), [[5; 6], [11; 6]].concat());
-    // A tube with lids, one of which looks inwards; a cone on its base.
+    // A tube with lids, one of which faces inwards; a cone on its base.
     let (a, b) = (v(0.3, -0.2, 0.1), v(1.0, 0.5, -0.4));
     let tube = Shape::Cylinder { a, b, radius: 0.4, caps: false };
     let lid = |center: DVec3, normal: DVec3| Shape::Disk { center, normal, radius: 0.4 };
@@ -268,8 +268,8 @@ fn quads_of_glass_are_a_box() {
 }
 
 #[test]
-fn a_camera_in_a_body_of_parts_is_in_its_glass() {
-    // A lamp in the glass, which the camera sees through 0.8 of it: no surface of glass is on the way.
+fn camera_inside_a_solid_in_parts_is_in_glass() {
+    // A light in the glass, seen by the camera through 0.8 of glass with no surface in between.
     let (low, high) = (v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0));
     let material = tinted(1.33, v(0.5, 0.5, 0.5));
     let lit = |build: Build| {
@@ -290,23 +290,23 @@ fn a_camera_in_a_body_of_parts_is_in_its_glass() {
         3,
     );
     let mesh = |mesh: &TriangleMesh| scene().mesh(mesh.clone(), AS_IT_IS, material.clone());
-    // Of the quads, the last one is above: the surface of a pool.
+    // The last quad is the top: the surface of a pool.
     let bodies = [
         ("a box", whole),
         ("quads", of(&quads(low, high, 0), &none)),
-        ("quads that look inwards", of(&quads(low, high, 0b10_0110), &none)),
+        ("quads that face inwards", of(&quads(low, high, 0b10_0110), &none)),
         ("a pool", of(&quads(low, high, 0), &|number| number != 5)),
         ("a mesh", mesh(&cube)),
-        ("a mesh that looks inwards", mesh(&turned(&cube))),
+        ("a mesh that faces inwards", mesh(&turned(&cube))),
     ];
     for (what, build) in bodies {
         for integrator in [Integrator::Whitted, Integrator::Path] {
             let value = lit(build.clone()).with(|scene| scene.render.integrator = integrator).value();
             let expected = 2.0 * 0.5_f64.powf(0.8);
-            assert!((value - expected).abs() < 1e-3, "{what} by {integrator:?}: {value} is not {expected}");
+            assert!((value - expected).abs() < 1e-3, "{what} with {integrator:?}: {value} is not {expected}");
         }
     }
-    // Outside of it, above the pool, nothing is on the way.
+    // Above the pool, outside of it, the ray passes no glass.
     let above = of(&quads(low, high, 0), &|number| number != 5)
         .sphere(v(0.3, 0.9, 3.0), 0.1, emitter(2.0))
         .seen(v(0.3, 0.0, 3.0), v(0.3, 0.9, 3.0));
@@ -314,7 +314,7 @@ fn a_camera_in_a_body_of_parts_is_in_its_glass() {
 }
 
 #[test]
-fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
+fn light_inside_a_solid_in_parts_emits_photons() {
     let cube = |low: f64, high: f64, z: f64| {
         let at = |x: f64, y: f64| v(x, y, z);
         prism(
@@ -324,8 +324,7 @@ fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
             2,
         )
     };
-    // A lamp in a hollow of a cube of glass, both meshes.
-    // The room is seen from above, and open there.
+    // A light in a hollow glass cube, both meshes. The room is seen from above, where it is open.
     let walls = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0), 0).into_iter().take(5);
     let hollow = walls
         .fold(scene(), |build, wall| build.shape(wall, matte(0.6)))
@@ -334,7 +333,7 @@ fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
         .sphere(v(0.0, 0.0, 1.0), 0.2, emitter(5.0))
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 24.0, 12, 12)
         .depth(5);
-    // A lamp in a bubble under the surface of a pool with opaque walls.
+    // A light in a bubble under the surface of a pool with opaque walls.
     let water = tinted(1.33, v(0.5, 0.5, 0.5));
     let pool = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 1.0), 0).into_iter().enumerate();
     let pool = pool
@@ -351,8 +350,8 @@ fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
     }
 }
 
-/// Checks that two scenes have the same picture by its mean and that of its quarters, within so many standard errors
-/// and a fraction of the value.
+/// Checks that two scenes give the same image mean and quarter means, within `errors` standard errors and a fraction of the
+/// value.
 #[track_caller]
 fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64, part: f64) {
     let means = |build: &Build, first: u32| -> Vec<[f64; 5]> {
@@ -377,14 +376,14 @@ fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64
         };
         let ((a, a_error), (b, b_error)) = (of(&one), of(&other));
         let allowed = errors * a_error.hypot(b_error) + part * a;
-        assert!(a > 0.0 && a_error < 0.02 * a, "{what}, {quarter}: {a} ± {a_error} says nothing");
+        assert!(a > 0.0 && a_error < 0.02 * a, "{what}, {quarter}: {a} ± {a_error} is too noisy");
         assert!((a - b).abs() <= allowed, "{what}, {quarter}: {a} ± {a_error}, {b} ± {b_error}");
     }
 }
 
 #[test]
-fn seams_of_textures_are_no_holes() {
-    // Every triangle has vertices of its own.
+fn texture_seams_are_not_holes() {
+    // No triangles share vertices.
     let whole = lat_long_sphere(12, 20, 0.7, v(0.1, 0.2, 0.9));
     let positions: Vec<Vec3> =
         whole.triangles.iter().flatten().map(|&i| whole.positions[i as usize]).collect();
@@ -393,7 +392,7 @@ fn seams_of_textures_are_no_holes() {
     let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, AS_IT_IS, glass(1.5)));
     assert_eq!(of(loose), GlassSolids::default());
     assert_eq!(of(whole.clone()), GlassSolids::default());
-    // Its front looks inwards.
+    // Its front faces inwards.
     assert!(of(turned(&whole)).is_inside_out(0) && of(turned(&whole)).open().is_empty());
     // A mirrored instance.
     let mirrored =
@@ -402,11 +401,11 @@ fn seams_of_textures_are_no_holes() {
 }
 
 #[test]
-fn glass_with_a_hole_is_named() {
+fn glass_with_a_hole_is_reported() {
     let mut random = Random(3);
     for round in 0..40 {
         let whole = closed(round);
-        // Without a triangle; or one triangle is turned.
+        // Remove a triangle, or reverse one.
         let lost = (random.unit() * whole.triangles.len() as f64) as usize;
         let mut parts = cut(&part(&whole, |i| i != lost), 3, &mut random);
         let open = bodies(&room(&parts, &glass(1.5)));
@@ -426,7 +425,7 @@ fn glass_with_a_hole_is_named() {
             assert!(!one.disagrees && !one.is_covered, "round {round}: {one:?}");
             assert_eq!(open.is_open(open.place(one.object)), expected > 1e-3, "round {round}");
         }
-        // Put back the wrong way round.
+        // Put it back in the wrong orientation.
         parts[0].triangles.push({
             let [a, b, c] = whole.triangles[lost];
             [a, c, b]
@@ -437,8 +436,8 @@ fn glass_with_a_hole_is_named() {
 }
 
 #[test]
-fn a_sheet_between_opaque_walls_closes_with_them() {
-    // The surface of a pool: to the walls, and through them.
+fn sheet_between_opaque_walls_is_closed() {
+    // The surface of a pool: up to the walls, and through them.
     let wall = |build: Build, corner: DVec3, u: DVec3, w: DVec3| build.quad(corner, u, w, matte(0.5));
     let pool = |reach: f64| {
         let (x, y, z) = (v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), v(0.0, 0.0, 1.0));
@@ -466,8 +465,8 @@ fn a_sheet_between_opaque_walls_closes_with_them() {
 }
 
 #[test]
-fn an_opaque_surface_that_is_curved_closes_what_ends_on_it() {
-    // A label in a ball of glass; the ball has no triangles under it.
+fn curved_opaque_surface_closes_a_sheet() {
+    // A label on a glass ball; the ball has no triangles under it.
     let ball = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| ball.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let is_label = |i: usize| middle(i).x > 0.4;
@@ -477,11 +476,11 @@ fn an_opaque_surface_that_is_curved_closes_what_ends_on_it() {
     };
     let fits = bodies(&with(label.clone()));
     assert!(!fits.has_open() && fits.open().iter().all(|open| open.is_covered), "{:?}", fits.open());
-    // It has come off.
+    // The label has come off.
     let off =
         TriangleMesh { positions: label.positions.iter().map(|p| p + Vec3::X * 0.02).collect(), ..label };
     assert!(bodies(&with(off)).has_open());
-    // Two panes close a tube that is not of glass. The chords of their rims are 2 % of its radius off.
+    // Two panes close a tube that is not glass. The chords of their rims deviate by 2 % of its radius.
     let pane = |radius: f64, height: f64, faces_up: bool| {
         let mut mesh =
             TriangleMesh { positions: vec![v(0.0, 0.0, height).as_vec3()], ..TriangleMesh::default() };
@@ -504,8 +503,8 @@ fn an_opaque_surface_that_is_curved_closes_what_ends_on_it() {
 }
 
 #[test]
-fn holes_are_covered_each_by_itself() {
-    // Five sides of a box on a table, one beside it in the air, one with its hole upwards, one on a mesh.
+fn each_hole_is_covered_independently() {
+    // Five sides of a box: on a table, next to it in the air, with the hole upwards, and on a mesh.
     let (low, high) = (v(0.0, 0.0, 0.0), v(1.0, 1.0, 0.5));
     let five = |at: DVec3, lost: usize| {
         let all = quads(low + at, high + at, 0).into_iter().enumerate();
@@ -544,9 +543,9 @@ fn holes_are_covered_each_by_itself() {
 }
 
 #[test]
-fn a_mesh_that_looks_inwards_in_a_mesh_of_its_glass_is_a_cavity() {
+fn inward_mesh_inside_glass_is_a_cavity() {
     let tint = v(0.5, 0.9, 0.25);
-    // Without reflection and refraction: what comes straight through is tinted by the way in glass.
+    // Without reflection and refraction, light is tinted by the distance it travels in glass.
     let material = tinted(1.0, tint);
     let seen = |parts: &[TriangleMesh], x: f64| {
         let build = scene().background(1.0).depth(20).seen(v(x, 0.013, 5.0), v(x, 0.013, 0.0));
@@ -558,7 +557,7 @@ fn a_mesh_that_looks_inwards_in_a_mesh_of_its_glass_is_a_cavity() {
         let color = seen(parts, x);
         for channel in 0..3 {
             let exact = tint[channel].powf(way);
-            assert!((color[channel] - exact).abs() < 2e-3, "{what}, {x}: {color} for a way of {way}");
+            assert!((color[channel] - exact).abs() < 2e-3, "{what}, {x}: {color} for a distance of {way}");
         }
     };
     let (outer, inner) = (ball(1.0), ball(0.8));
@@ -571,9 +570,9 @@ fn a_mesh_that_looks_inwards_in_a_mesh_of_its_glass_is_a_cavity() {
         let onion = [outer.clone(), turned(&ball(0.2)), turned(&inner), ball(0.5)];
         check("a ball in it", &onion, x, shell + chord(0.5, x) - chord(0.2, x));
         let lost = [outer.clone(), turned(&inner), turned(&ball(0.5))];
-        check("a ball in it that is inside out", &lost, x, shell + chord(0.5, x));
+        check("an inside-out ball in it", &lost, x, shell + chord(0.5, x));
     }
-    // Two cavities, each in its own place; and one that is partly outside is none.
+    // Two cavities, each in its place; one that is partly outside is not a cavity.
     let at = |radius: f64, x: f64| lat_long_sphere(24, 48, radius, v(x, 0.0, 0.0));
     let two = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
     let two = two.mesh(turned(&at(0.3, -0.5)), AS_IT_IS, material.clone());
@@ -590,12 +589,12 @@ fn a_mesh_that_looks_inwards_in_a_mesh_of_its_glass_is_a_cavity() {
 }
 
 #[test]
-fn open_glass_is_the_same_by_paths_and_photons() {
+fn open_glass_matches_paths_and_photons() {
     let material = tinted(1.8, v(0.5, 0.9, 0.7));
     let sphere = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| sphere.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let (bowl, dome) = (part(&sphere, |i| middle(i).z < 0.9), part(&sphere, |i| middle(i).z > 0.95));
-    // Two parts of one body that do not meet: each of them is open.
+    // Two parts of one solid that do not meet: both are open.
     let block = closed(2);
     let height = |i: usize| block.corners(i as u32).iter().map(|corner| corner.z).sum::<f32>() / 3.0;
     let apart = [part(&block, |i| height(i) > 0.89), part(&block, |i| height(i) < 0.6)];

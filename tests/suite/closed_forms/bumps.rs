@@ -1,4 +1,4 @@
-//! Textures of heights: a ramp is a tilted plane, and waves have the normals of their derivatives.
+//! Height textures: a ramp equals a tilted plane, and waves have the normals given by their derivatives.
 
 use std::f64::consts::{PI, TAU};
 
@@ -14,7 +14,7 @@ use super::scenes::{
 };
 use super::v;
 
-/// A texture of heights by their place in the image, from (0, 0) at the bottom left to (1, 1).
+/// A texture of heights as a function of the position in the image, from (0, 0) at the bottom left to (1, 1).
 fn heights(build: &mut Build, size: usize, height: impl Fn(DVec2) -> f64) -> usize {
     let place = |i: usize| (i as f64 + 0.5) / size as f64;
     let row =
@@ -28,7 +28,7 @@ fn bumped(texture: usize, scale: f64, material: Material) -> Material {
     Material { bump: Some(Bump { texture, channel: None, scale: scale as f32 }), ..material }
 }
 
-/// Materials of every kind that shows its normals.
+/// Materials of every kind that shows its shading normal.
 fn materials() -> Vec<(&'static str, Material)> {
     vec![
         ("phong", phong(0.3, 0.5, 20.0, 0.0)),
@@ -42,9 +42,9 @@ fn materials() -> Vec<(&'static str, Material)> {
 }
 
 #[test]
-fn a_ramp_is_shaded_as_a_tilted_plane() {
-    // Heights of 0.3·u over edges of 2 are slopes of 0.15; the tilted plane goes through the point that is seen. The light is
-    // where the bent normal faces it less than the surface does: nothing fades.
+fn ramp_is_shaded_like_a_tilted_plane() {
+    // Heights of 0.3·u over edges of length 2 have slope 0.15; the tilted plane contains the visible point. The light
+    // is placed where the shading normal faces it less than the surface does, so that nothing fades.
     let slope = 0.15;
     let up = v(-slope, 1.0, 0.0).normalize();
     let eye = v(1.0, 1.5, 0.4);
@@ -53,7 +53,7 @@ fn a_ramp_is_shaded_as_a_tilted_plane() {
         .shadows(Shadows::Off, 1)
         .seen(eye, DVec3::ZERO);
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
-        // A mirror shows no point light, but what is around.
+        // A mirror does not show a point light, but its surroundings.
         let lit = lit.clone().background(if name == "mirror" { 0.25 } else { 0.0 });
         let mut relief = lit.clone();
         let texture = heights(&mut relief, 8, |at| at.x);
@@ -68,8 +68,9 @@ fn a_ramp_is_shaded_as_a_tilted_plane() {
 }
 
 #[test]
-fn a_ramp_is_a_normal_map_of_one_slope() {
-    // On a cube of edges of 1 the slopes are those of the map. Its faces show the middle half of the image, a ramp everywhere.
+fn ramp_equals_a_constant_normal_map() {
+    // On a cube with edges of length 1, the slopes equal those of the map. Its faces show the middle half of the image,
+    // which is a ramp everywhere.
     let slope = 0.25;
     for (name, material) in materials() {
         for integrator in [Integrator::Whitted, Integrator::Path] {
@@ -93,32 +94,32 @@ fn a_ramp_is_a_normal_map_of_one_slope() {
                 let off = (relief - mapped).abs().max_element();
                 assert!(
                     off < 2e-4 * mapped.max_element(),
-                    "{name} by {integrator:?}: {relief} is not {mapped}"
+                    "{name} with {integrator:?}: {relief} is not {mapped}"
                 );
             }
         }
     }
 }
 
-/// The shading normal that is seen.
+/// The visible shading normal.
 fn normal(build: &Build) -> DVec3 {
     build.clone().viewed(View::Normal).color() * 2.0 - 1.0
 }
 
-/// Height of the waves over an image, and its gradient.
+/// The waves' height over an image, and its gradient.
 fn waves(at: DVec2) -> (f64, DVec2) {
     let phase = TAU * at;
     let slopes = DVec2::new(phase.x.cos() * phase.y.cos(), -phase.x.sin() * phase.y.sin());
     (phase.x.sin() * phase.y.cos(), slopes * TAU)
 }
 
-/// Columns of the image of waves: the slope over a texel of it, of what is interpolated between texels, is less by 2·10⁻⁴ of
-/// the steepest.
+/// Number of columns in the image of the waves. Interpolating between texels reduces the slope by 2·10⁻⁴ of the
+/// steepest.
 const COLUMNS: usize = 256;
 
 #[test]
-fn waves_on_a_parallelogram_have_their_normals_however_they_are_tiled() {
-    // The image's coordinates are s = R(r·(u, v)) + o, so that ∇h by (u, v) is r·Rᵀ∇h by s.
+fn tiled_waves_give_their_analytic_normals() {
+    // The image's coordinates are s = R(r·(u, v)) + o, so that the gradient ∇h by (u, v) is r·Rᵀ∇h by s.
     let (u, w) = (v(2.0, 0.0, 0.0), v(0.5, 0.0, -1.5));
     for (repeat, degrees, offset) in [
         (DVec2::ONE, 0.0_f64, DVec2::ZERO),
@@ -135,7 +136,7 @@ fn waves_on_a_parallelogram_have_their_normals_however_they_are_tiled() {
             let slopes = repeat
                 * DVec2::from_angle(-degrees.to_radians()).rotate(waves(turn.rotate(repeat * at) + offset).1)
                 * 0.05;
-            // The graph's own tangents are u and w, raised by the slopes.
+            // The tangents of the graph are u and w, raised by the slopes.
             let expected = (u + DVec3::Y * slopes.x).cross(w + DVec3::Y * slopes.y).normalize();
             let point = u * at.x + w * at.y;
             let found = normal(&build.clone().seen(point + v(0.3, 2.0, 0.2), point));
@@ -148,7 +149,7 @@ fn waves_on_a_parallelogram_have_their_normals_however_they_are_tiled() {
 }
 
 #[test]
-fn waves_on_a_sphere_and_on_its_mesh_have_the_normals_of_the_displaced_sphere() {
+fn waves_on_a_sphere_give_displaced_normals() {
     // The point is (R + h)·n; its derivatives by longitude and latitude span the tangent plane, to first order in h/R.
     let (radius, scale) = (2.0, 1e-2);
     let direction = |uv: DVec2| {
@@ -174,9 +175,9 @@ fn waves_on_a_sphere_and_on_its_mesh_have_the_normals_of_the_displaced_sphere() 
 }
 
 #[test]
-fn waves_on_a_mesh_follow_its_coordinates_and_its_placement() {
-    // Its corners have the coordinates 2·(x, z) + (0.1, 0.2) in the file; the instance is three times as large, and mirrored.
-    // Heights are lengths of the scene: they do not grow with the instance.
+fn waves_follow_mesh_coordinates_and_transform() {
+    // Its vertices have the texture coordinates 2·(x, z) + (0.1, 0.2) in the file; the instance is scaled by three and
+    // mirrored. Heights are lengths in the scene, so they do not scale with the instance.
     let corners = [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(1.0, 0.0, 1.0), v(0.0, 0.0, 1.0)];
     let coordinates = |at: DVec3| DVec2::new(at.x, at.z) * 2.0 + DVec2::new(0.1, 0.2);
     for mirrored in [1.0, -1.0] {
@@ -201,8 +202,8 @@ fn waves_on_a_mesh_follow_its_coordinates_and_its_placement() {
 }
 
 #[test]
-fn far_waves_with_levels_are_flat() {
-    // A pixel of 1° from 400 units is 7 units wide, and a wave one.
+fn distant_mipmapped_waves_are_flat() {
+    // From 400 units away, a pixel of 1° is 7 units wide, and a wave 1 unit.
     let mut build = scene();
     let texture = heights(&mut build, 32, |at| waves(at).0);
     build.scene.textures[texture].repeat = Vec2::splat(200.0);
@@ -222,7 +223,8 @@ fn far_waves_with_levels_are_flat() {
 
 #[test]
 fn bumpy_balls_have_no_black_edge() {
-    // Where normals turn away from the viewer, what is reflected is still that of the sky. The waves go from pole to pole.
+    // Where shading normals face away from the viewer, the reflection still shows the sky. The waves run from pole to
+    // pole.
     let mut darkest = Vec::new();
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
         let mut build = scene().environment(1.0);
@@ -244,8 +246,8 @@ fn bumpy_balls_have_no_black_edge() {
 }
 
 #[test]
-fn light_behind_a_bent_normal_is_none() {
-    // Slopes of 60° towards light that comes in from behind them, at 3° to 20° above the surface.
+fn no_light_from_behind_the_shading_normal() {
+    // Slopes of 60° facing light that arrives from behind them, at 3° to 20° above the surface.
     let slope = 3.0_f64.sqrt();
     for (name, material) in materials().into_iter().filter(|(name, _)| !["glass", "mirror"].contains(name)) {
         for (degrees, shadows) in [
@@ -270,8 +272,8 @@ fn light_behind_a_bent_normal_is_none() {
 }
 
 #[test]
-fn hard_shadows_of_a_point_are_those_of_soft_ones_on_a_relief() {
-    // Samples of lobes that lead behind a bent normal have no density.
+fn hard_and_soft_point_shadows_agree_on_bumps() {
+    // Lobe samples that lead behind the shading normal have no pdf.
     for (name, material) in [
         ("translucent", translucent(0.8, 0.3, 0.5)),
         ("plastic", plastic(0.7, 0.3)),

@@ -9,7 +9,7 @@ use glimt::scene::description::Render;
 use super::scenes::{emitter, scene, tile};
 use super::{Random, assert_close, assert_mean, v};
 
-/// A lens with an aperture of 0.2, in focus at 5, 40° over 480 pixels, along −z.
+/// A camera with aperture 0.2, focused at 5, with 40° over 480 pixels, looking along −z.
 fn lens() -> Camera {
     Camera::LookAt {
         position: DVec3::ZERO,
@@ -23,13 +23,13 @@ fn lens() -> Camera {
 
 const SIZE: u32 = 480;
 
-/// Pixels to a unit of length at distance d.
+/// Pixels per unit of length at distance d.
 fn pixels_per_length(d: f64) -> f64 {
     f64::from(SIZE) / (2.0 * d * 20.0_f64.to_radians().tan())
 }
 
 #[test]
-fn rays_pass_through_what_is_projected_on_their_pixel() {
+fn rays_pass_through_projected_points() {
     let mut random = Random(1);
     for _ in 0..200 {
         let (position, target) = (random.direction() * 7.0, random.direction() * 2.0);
@@ -38,7 +38,7 @@ fn rays_pass_through_what_is_projected_on_their_pixel() {
             scene.camera = Camera::LookAt { position, look_at: target, up, fov, aperture: 0.0, focus: 1.0 };
         });
         let camera = build.world().camera;
-        // The view matrix of a textbook: rows s, u, −f; then the perspective division.
+        // The textbook view matrix, with rows s, u, −f, followed by the perspective division.
         let f = (target - position).normalize();
         let s = f.cross(up).normalize();
         let u = s.cross(f);
@@ -58,14 +58,14 @@ fn rays_pass_through_what_is_projected_on_their_pixel() {
 }
 
 #[test]
-fn the_extent_of_the_circle_of_confusion() {
-    // A point at d is spread over A·|d − d_f|/d_f·… = A·|d − d_f|/d on the plane in focus, in pixels of that plane.
+fn circle_of_confusion_has_the_right_diameter() {
+    // A point at distance d is spread over A·|d − d_f|/d on the focal plane, measured in pixels of that plane.
     let camera = scene().with(|scene| scene.camera = lens()).world().camera;
     for (d, exact) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let formula = 0.2 * f64::abs(d - 5.0) / d * pixels_per_length(5.0);
         assert!((formula - exact).abs() < 1e-4);
-        // Intersect the ray through the middle pixel and a point of the lens with the plane at d, in that plane's
-        // pixels.
+        // Intersect the ray through the middle pixel and a point of the lens with the plane at d, in pixels of that
+        // plane.
         let mut extent = DVec3::ZERO;
         for step in 0..3600 {
             let (sin, cos) = (f64::from(step) / 1800.0 * std::f64::consts::PI).sin_cos();
@@ -79,8 +79,8 @@ fn the_extent_of_the_circle_of_confusion() {
 }
 
 #[test]
-fn the_blur_of_a_small_light() {
-    // Its picture is disk ∗ square ∗ pixel: the variance along an axis is D²/16 + s²/12 + 1/12, the sum of all pixels s².
+fn small_light_blurs_with_the_right_variance() {
+    // Its image is disk ∗ square ∗ pixel: the variance along an axis is D²/16 + s²/12 + 1/12, the sum of all pixels s².
     for (d, diameter) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let s = 3.0 / pixels_per_length(d);
         let build = scene().quad(v(-s / 2.0, -s / 2.0, -d), v(s, 0.0, 0.0), v(0.0, s, 0.0), emitter(1.0));

@@ -1,5 +1,5 @@
-//! Light by photons beside the same light by paths: means of blocks of pixels and of the whole picture, with their spread over
-//! seeds; and even light up to edges and walls, which cut kernels.
+//! Photon-mapped light against the same path-traced light: means of blocks of pixels and of the whole image, with their
+//! spread over seeds. Also uniform light up to edges and walls, which truncate kernels.
 
 use std::f64::consts::PI;
 
@@ -19,18 +19,17 @@ use super::scenes::{
 };
 use super::v;
 
-/// Seeds of each method.
+/// Seeds for each method.
 const SEEDS: u32 = 16;
-/// Pixels along a side of a picture, and blocks of them.
+/// Pixels along one side of an image, and blocks of them.
 const SIDE: usize = 16;
 const BLOCKS: usize = 4;
-/// Largest joint standard error of both methods, as a fraction of the light: a deviation of 3 % is then far beyond
-/// chance.
+/// Largest joint standard error of both methods, relative to the light: a deviation of 3 % is then far beyond chance.
 const MOST_ERROR: f64 = 4.5e-3;
-/// Bias that kernels may have in smooth light, far from edges.
+/// Allowed bias of the kernels in smooth light, far from edges.
 const SLACK: f64 = 1.5e-3;
 
-/// Effort of both methods, and the width of the kernels.
+/// Effort of both methods, and the radius of the kernels.
 struct Effort {
     path_samples: u32,
     passes: u32,
@@ -38,7 +37,7 @@ struct Effort {
     radius: f64,
 }
 
-/// Means of the blocks, row by row, and then that of the whole.
+/// Means of the blocks, row by row, followed by the mean of the whole image.
 fn means(picture: &[DVec3]) -> Vec<f64> {
     let of = SIDE / BLOCKS;
     let block = |number: usize| {
@@ -51,7 +50,7 @@ fn means(picture: &[DVec3]) -> Vec<f64> {
     blocks.into_iter().chain([whole]).collect()
 }
 
-/// Mean and standard error of each of the means, for each of the views.
+/// Mean and standard error of each of these means, for each view.
 fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
     let world = build.world();
     let rect = Rect { x: 0, y: 0, width: SIDE as u32, height: SIDE as u32 };
@@ -67,8 +66,8 @@ fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
     (0..views.len()).map(|view| (0..=BLOCKS * BLOCKS).map(|i| of(view, i)).collect()).collect()
 }
 
-/// Checks that both methods see the same light: each block within 5 standard errors and 1.5 %, the whole within 4 and
-/// SLACK.
+/// Checks that both methods give the same light: each block within 5 standard errors and 1.5 %, the whole image within
+/// 4 and `SLACK`.
 #[track_caller]
 fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort) {
     let &Effort { path_samples, passes, photons, radius } = effort;
@@ -80,17 +79,17 @@ fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort)
         let (blocks, whole) = (0..BLOCKS * BLOCKS, BLOCKS * BLOCKS);
         let ((a, da), (b, db)) = (by_paths[whole], by_photons[whole]);
         let error = da.hypot(db);
-        assert!(error < MOST_ERROR * a, "{what}: {b} ± {db} says nothing, by paths {a} ± {da}");
-        assert!((a - b).abs() < 4.0 * error + SLACK * a, "{what}: {b} ± {db}, by paths {a} ± {da}");
+        assert!(error < MOST_ERROR * a, "{what}: {b} ± {db} is too noisy, path-traced {a} ± {da}");
+        assert!((a - b).abs() < 4.0 * error + SLACK * a, "{what}: {b} ± {db}, path-traced {a} ± {da}");
         for i in blocks {
             let ((a, da), (b, db)) = (by_paths[i], by_photons[i]);
             let allowed = 5.0 * da.hypot(db) + 1.5e-2 * a;
-            assert!((a - b).abs() <= allowed, "{what}, block {i}: {b} ± {db}, by paths {a} ± {da}");
+            assert!((a - b).abs() <= allowed, "{what}, block {i}: {b} ± {db}, path-traced {a} ± {da}");
         }
     }
 }
 
-/// [`assert_same_light`] for the caustic alone.
+/// [`assert_same_light`] for the caustic only.
 #[track_caller]
 fn assert_same_caustic(what: &str, build: &Build, effort: &Effort) {
     assert_same_light(what, build, &[View::Caustic], effort);
@@ -101,14 +100,14 @@ fn floor() -> Build {
     scene().quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), matte(0.7))
 }
 
-/// A square around a point, this wide, viewed from this far above.
+/// A square of this width around a point, seen from this height above.
 fn looked_at(build: Build, at: DVec3, width: f64, above: f64) -> Build {
     let from = v(at.x, at.y + above, at.z + 1e-4 * above);
     let angle = 2.0 * (0.5 * width / above).atan();
     build.pictured(from, at, angle.to_degrees(), SIDE as u32, SIDE as u32)
 }
 
-/// A room that glows, with a mirror ball and a glass ball, without a camera yet.
+/// A glowing room with a mirror ball and a glass ball, without a camera.
 fn room(floor: Material, wall: impl Fn(f32) -> Material) -> Build {
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
@@ -125,14 +124,14 @@ fn room(floor: Material, wall: impl Fn(f32) -> Material) -> Build {
 }
 
 #[test]
-fn a_ball_of_glass_and_a_mirror_in_a_box_throw_the_light_that_paths_find() {
+fn glass_and_mirror_caustics_match_path() {
     let middle = looked_at(room(matte(0.7), emitter), v(0.0, 0.0, 0.7), 0.4, 1.9).depth(6);
     let effort = Effort { path_samples: 256, passes: 16, photons: 30_000, radius: 0.06 };
     assert_same_caustic("the middle of a floor", &middle, &effort);
 }
 
 #[test]
-fn every_part_of_the_light_by_photons_is_that_by_paths_and_they_add_up() {
+fn photon_components_match_path_and_add_up() {
     let glossy = room(phong(0.4, 0.4, 20.0, 0.0), |radiance| phong(0.4, 0.0, 1.0, radiance));
     let whole = glossy.pictured(v(0.0, 1.4, 0.9), v(0.15, 0.1, 0.4), 40.0, SIDE as u32, SIDE as u32).depth(5);
     let effort = Effort { path_samples: 128, passes: 20, photons: 15_000, radius: 0.03 };
@@ -147,7 +146,7 @@ fn every_part_of_the_light_by_photons_is_that_by_paths_and_they_add_up() {
 }
 
 #[test]
-fn water_in_a_wide_sun_throws_the_light_that_paths_find() {
+fn water_caustics_match_path() {
     let angle = 20.0_f64.to_radians();
     let ground = scene()
         .shape(Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y }, glass(1.33))
@@ -160,7 +159,7 @@ fn water_in_a_wide_sun_throws_the_light_that_paths_find() {
 }
 
 #[test]
-fn a_ring_throws_the_light_that_paths_find() {
+fn ring_caustics_match_path() {
     let wall = Shape::Cylinder { a: v(0.0, -0.01, 0.0), b: v(0.0, 1.0, 0.0), radius: 0.8, caps: false };
     let ring = looked_at(floor().shape(wall, mirror(0.95)), DVec3::ZERO, 1.0, 40.0).depth(5);
     let lit = sun(ring, v(-0.6, -0.8, 0.1), 1.0, 80.0);
@@ -169,7 +168,7 @@ fn a_ring_throws_the_light_that_paths_find() {
 }
 
 #[test]
-fn a_sky_through_glass_throws_the_light_that_paths_find() {
+fn sky_caustics_match_path() {
     let sky = [4.0, 3.0, 1.0, 0.5, 1.0, 0.6, 0.3, 0.2].map(Vec3::splat).to_vec();
     let build = floor().sphere(v(0.0, 0.5, 0.0), 0.4, glass(1.5));
     let lit = looked_at(build, v(0.2, 0.0, 0.1), 1.4, 40.0).depth(5).sky(4, sky, 0.0);
@@ -178,7 +177,7 @@ fn a_sky_through_glass_throws_the_light_that_paths_find() {
 }
 
 #[test]
-fn a_smooth_mesh_of_glass_throws_the_light_that_paths_find() {
+fn smooth_mesh_caustics_match_path() {
     let build = floor()
         .mesh(lat_long_sphere(8, 12, 0.4, v(0.0, 0.5, 0.0)), AS_IT_IS, glass(1.4))
         .smooth()
@@ -189,26 +188,27 @@ fn a_smooth_mesh_of_glass_throws_the_light_that_paths_find() {
 }
 
 #[test]
-fn a_lamp_inside_glass_throws_the_light_that_paths_find() {
+fn caustics_of_a_light_in_glass_match_path() {
     let center = v(0.0, 0.6, 0.0);
     let build = floor().sphere(center, 0.35, emitter(1.0)).sphere(center, 0.5, glass(1.5));
     let lit = build.pictured(v(3.0, 1.5, 0.0), v(0.5, 0.0, 0.0), 20.0, SIDE as u32, SIDE as u32).depth(5);
     let effort = Effort { path_samples: 128, passes: 8, photons: 20_000, radius: 0.04 };
-    assert_same_caustic("a lamp in glass", &lit, &effort);
+    assert_same_caustic("a light in glass", &lit, &effort);
 }
 
-/// Passes after which light at an edge is right within [`AT_EDGES`].
+/// Passes after which the light at an edge is correct within [`AT_EDGES`].
 const PASSES: u32 = 64;
-/// Largest remaining loss of kernels at edges, as a fraction of the light. Without a correction, a kernel of radius r loses 8r/15πW
-/// of it in a strip of width W along an edge, with F(x) the part of 2/πr²·(1 − ρ²/r²) beyond the distance x and 8r/15π = ∫F.
+/// Largest remaining loss of kernels at edges, relative to the light. Without a correction, a kernel of radius r loses
+/// 8r/15πW of it in a strip of width W along an edge, with F(x) the part of 2/πr²·(1 − ρ²/r²) beyond the distance x and
+/// 8r/15π = ∫F.
 const AT_EDGES: f64 = 2e-3;
 
-/// A rectangle on the ground viewed from above, by its middle and its sides along x and z, in pixels of about one size.
+/// A rectangle on the ground seen from above, given its center and its sides along x and z, in nearly square pixels.
 fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     const PIXELS: f64 = 256.0;
     let side = (x * z / PIXELS).sqrt();
     let (across, up) = ((z / side).round().max(1.0), (x / side).round().max(1.0));
-    // The picture stands along x; its width is by its pixels.
+    // The image is oriented along x; its width follows from its pixels.
     let above = 20.0 * x.max(z);
     let fov = 2.0 * (0.5 * x / above).atan().to_degrees();
     assert!((across / up * x / z - 1.0).abs() < 0.3, "{across}×{up}");
@@ -216,20 +216,21 @@ fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     build.pictured(from, middle, fov, across as u32, up as u32).depth(3)
 }
 
-/// A sun at 45° that a lossless mirror at x = 0 reflects to the ground from x = `far` to x = `near` < 0, as wide along z. By the
-/// image of the sun its irradiance is cos 45° there, and as much on walls across x that face the mirror. Direct light is not shown.
+/// A sun at 45° that a lossless mirror at x = 0 reflects to the ground from x = `far` to x = `near` < 0, equally wide
+/// along z. The mirrored sun gives an irradiance of cos 45° there, and the same on walls across x that face the mirror.
+/// Direct light is not shown.
 fn mirrored(build: Build, (far, near): (f64, f64), (z, width): (f64, f64)) -> Build {
     let corner = v(0.0, -near, z + 0.5 * width);
     let lit = build.quad(corner, v(0.0, near - far, 0.0), v(0.0, 0.0, -width), mirror(1.0));
     sun(lit, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).viewed(View::Caustic)
 }
 
-/// Radiance of a surface of reflectance 0.7 in that light.
+/// Radiance of a surface with reflectance 0.7 in that light.
 fn even() -> f64 {
     0.5_f64.sqrt() * 0.7 / PI
 }
 
-/// Checks that the mean of the picture after [`PASSES`] is exact, within [`AT_EDGES`] and chance.
+/// Checks that the mean of the image after [`PASSES`] is exact, within [`AT_EDGES`] and noise.
 #[track_caller]
 fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: f64) {
     let build = build.clone().photons(photons, radius);
@@ -243,22 +244,22 @@ fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: 
     };
     let (mean, error) = mean_and_error(&(0..SEEDS).into_par_iter().map(one).collect::<Vec<_>>());
     let (off, error) = (mean / exact - 1.0, error / exact);
-    assert!(error < 1e-3, "{what}: {mean} ± {error} says nothing");
+    assert!(error < 1e-3, "{what}: {mean} ± {error} is too noisy");
     assert!(off.abs() < AT_EDGES + 4.0 * error, "{what}: {mean} is not {exact}, by {off} ± {error}");
 }
 
-/// A floor of reflectance .7 from x = −2 to −1.
+/// A floor with reflectance 0.7 from x = −2 to −1.
 fn small_floor() -> Build {
     scene().quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), matte(0.7))
 }
 
-/// A floor that goes on beyond that to all sides.
+/// A floor that extends further on all sides.
 fn long_floor() -> Build {
     scene().quad(v(-3.0, 0.0, 0.9), v(2.0, 0.0, 0.0), v(0.0, 0.0, -1.8), matte(0.7))
 }
 
 #[test]
-fn light_is_even_up_to_the_edges_of_a_floor() {
+fn photon_light_is_uniform_up_to_floor_edges() {
     let whole = mirrored(small_floor(), (-2.1, -0.9), (0.0, 1.2));
     let whole = strip(whole, v(-1.5, 0.0, 0.0), (0.999, 0.999));
     assert_even("the whole floor", &whole, (2500, 0.2), even());
@@ -271,8 +272,8 @@ fn light_is_even_up_to_the_edges_of_a_floor() {
 }
 
 #[test]
-fn light_is_even_where_a_wall_meets_a_floor() {
-    // The wall at the far edge of the floor, and on a floor that goes on behind it, in its shadow.
+fn photon_light_is_uniform_up_to_walls() {
+    // A wall at the far edge of the floor, and on a floor that continues behind it in its shadow.
     let wall = |build: Build| build.quad(v(-2.0, 0.0, 0.5), v(0.0, 0.0, -1.0), v(0.0, 0.6, 0.0), matte(0.7));
     for (what, floor) in [("at its edge", small_floor()), ("on it", long_floor())] {
         let room = mirrored(wall(floor), (-2.2, -1.75), (0.0, 0.6));
@@ -282,13 +283,13 @@ fn light_is_even_where_a_wall_meets_a_floor() {
         let low = room.pictured(v(-1.0, 0.05, 0.0), v(-2.0, 0.05, 0.0), 5.65, 48, 16).depth(3);
         assert_even(&format!("a wall {what}"), &low, (5000, 0.1), even());
     }
-    // Nothing comes through: behind the wall is its shadow.
+    // Nothing leaks through: the shadow behind the wall stays dark.
     let behind =
         strip(mirrored(wall(long_floor()), (-2.2, -1.75), (0.0, 0.6)), v(-2.06, 0.0, 0.0), (0.1, 0.3));
     assert!(behind.photons(5000, 0.1).picture(4, 1).iter().all(|color| *color == DVec3::ZERO));
 }
 
-/// A flat ring about (−1.5, 0, 0) of so many steps, from one radius to another, in `rows` of triangles.
+/// A flat ring about (−1.5, 0, 0) between two radii, in `steps` steps around and `rows` rows of triangles.
 fn flat_ring(steps: u32, rows: u32, inner: f32, outer: f32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for step in 0..steps {
@@ -307,7 +308,7 @@ fn flat_ring(steps: u32, rows: u32, inner: f32, outer: f32) -> TriangleMesh {
 }
 
 #[test]
-fn light_is_even_up_to_the_rims_of_rings_and_disks() {
+fn photon_light_is_uniform_up_to_rims() {
     let disk = Shape::Disk { center: v(-1.5, 0.0, 0.0), normal: DVec3::Y, radius: 0.5 };
     let of_mesh = |steps, rows| scene().mesh(flat_ring(steps, rows, 0.35, 0.5), AS_IT_IS, matte(0.7));
     for (what, build) in [
@@ -323,8 +324,8 @@ fn light_is_even_up_to_the_rims_of_rings_and_disks() {
 }
 
 #[test]
-fn light_is_even_around_a_box_that_stands_on_a_floor() {
-    // Before it, and beside it, where no shadow falls.
+fn photon_light_is_uniform_around_a_box() {
+    // In front of it, and next to it, where no shadow falls.
     let standing = long_floor().cuboid(v(-1.7, 0.1, 0.0), v(0.2, 0.2, 0.6), DVec3::ZERO, matte(0.5));
     let before = mirrored(standing.clone(), (-1.75, -1.4), (0.0, 0.6));
     let before = strip(before, v(-1.55, 0.0, 0.0), (0.099, 0.4));
@@ -332,18 +333,18 @@ fn light_is_even_around_a_box_that_stands_on_a_floor() {
     let beside = mirrored(standing, (-1.9, -1.5), (0.35, 0.35));
     let beside = strip(beside, v(-1.7, 0.0, 0.35), (0.18, 0.099));
     assert_even("beside a box", &beside, (4500, 0.08), even());
-    // On top of a box so low that kernels reach the floor beside it, whose plane receives nothing.
+    // On top of a box so low that kernels reach the floor around it, whose plane receives no light.
     let low = long_floor().cuboid(v(-1.7, 0.01, 0.0), v(0.2, 0.02, 0.6), DVec3::ZERO, matte(0.7));
     let top = strip(mirrored(low, (-1.95, -1.45), (0.0, 0.85)), v(-1.7, 0.02, 0.0), (0.199, 0.599));
     assert_even("on a low box", &top, (4500, 0.08), even());
 }
 
 #[test]
-fn no_photons_come_round_the_foot_of_a_wall() {
-    // A mirror without thickness stands on the ground, with the sun before it. It reflects light to the ground before it, where a
-    // kernel hangs over its foot; no light comes behind it.
+fn photons_do_not_leak_under_a_wall() {
+    // A mirror without thickness stands on the ground and faces the sun. It reflects light to the ground in front of
+    // it, where kernels extend past its foot; no light reaches the ground behind it.
     let (width, radius, passes) = (0.2, 0.1, 32);
-    // Put it on the ground, and a little above, where the light under it is negligible.
+    // Place it on the ground, and slightly above, where the light under it is negligible.
     let ground = |gap| floor().quad(v(0.0, gap, 2.0), v(0.0, 1.0, 0.0), v(0.0, 0.0, -4.0), mirror(0.9));
     let seen = |side: f64, gap: f64| {
         let strip = looked_at(ground(gap), v(side * 0.5 * width, 0.0, 0.0), width, 0.5).depth(3);
@@ -360,11 +361,11 @@ fn no_photons_come_round_the_foot_of_a_wall() {
 }
 
 #[test]
-fn what_a_ball_at_rest_throws_to_its_foot_arrives_there() {
-    // Under a ball of glass that rests on the ground there is no room above the ground, and light all the same.
+fn caustic_under_a_resting_ball_matches_path() {
+    // A glass ball rests on the ground: there is no gap under it, yet light arrives there.
     let ball = floor().sphere(v(0.0, 0.5, 0.0), 0.5, glass(1.5));
     let foot = looked_at(ball, v(0.06, 0.0, 0.0), 0.16, 0.15).depth(6);
     let lit = sun(foot, v(0.2, -1.0, 0.0).normalize(), 1.0, 25.0);
     let effort = Effort { path_samples: 512, passes: 16, photons: 20_000, radius: 0.01 };
-    assert_same_caustic("a ball at rest", &lit, &effort);
+    assert_same_caustic("a resting ball", &lit, &effort);
 }

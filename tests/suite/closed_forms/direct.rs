@@ -1,4 +1,4 @@
-//! Direct light of every kind of light on a diffuse surface: L = ρ·E/π.
+//! Direct light from every kind of light on a diffuse surface: L = ρ·E/π.
 
 use std::f64::consts::PI;
 
@@ -20,8 +20,8 @@ pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     }
 }
 
-/// Checks the value for hard shadows, where one ray to the middle decides: from the receiver, all of the light is
-/// visible or none of it.
+/// Checks the value with hard shadows, where one ray to the center decides: from the receiver, the light is either
+/// fully visible or fully hidden.
 #[track_caller]
 pub fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
     let values = lit.clone().shadows(Shadows::Hard, 4).values(64, 64);
@@ -32,14 +32,14 @@ pub fn at_origin() -> Build {
     receiver(DVec3::ZERO, 0.7)
 }
 
-/// A unit square that shines down on the origin from its height.
+/// A unit square at `height` that shines down on the origin.
 fn square_above(height: f64) -> Build {
     at_origin().quad(v(-0.5, height, -0.5), DVec3::X, DVec3::Z, emitter(1.0))
 }
 
 #[test]
-fn a_point_light_with_and_without_fall_off() {
-    // E = I·cos θ/d² = 10·(2/√5)/5 = 1.788854382; L = .7·E/π. Without fall-off E = I·cos θ.
+fn point_light_falloff_is_exact() {
+    // E = I·cos θ/d² = 10·(2/√5)/5 = 1.788854382; L = 0.7·E/π. Without falloff E = I·cos θ.
     let lit = |falloff| at_origin().point_light(v(1.0, 2.0, 0.0), 10.0, falloff);
     for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
         let value = |falloff| lit(falloff).shadows(shadows, 3).value();
@@ -49,9 +49,9 @@ fn a_point_light_with_and_without_fall_off() {
 }
 
 #[test]
-fn the_shadow_of_a_point_is_sharp_and_where_it_belongs() {
-    // Light at height 4 over x = 0, blocker x < 0 at height 1: the shadow ends at x = 0 · 4/3 − 0 = 0; for a blocker that
-    // ends at x = b it ends at b·4/3.
+fn point_shadow_is_sharp_and_in_place() {
+    // Light at height 4 over x = 0, blocker x < 0 at height 1: the shadow ends at x = 0 · 4/3 − 0 = 0; for a blocker
+    // that ends at x = b it ends at b·4/3.
     let lit = |x: f64, b: f64| {
         receiver(v(x, 0.0, 0.0), 0.7).point_light(v(0.0, 4.0, 0.0), 1.0, Falloff::None).quad(
             v(b - 100.0, 1.0, -100.0),
@@ -73,7 +73,7 @@ fn the_shadow_of_a_point_is_sharp_and_where_it_belongs() {
 
 #[test]
 fn parallel_squares() {
-    // A quarter of the square by the corner formula with A = B = ½/h, four times; E = π·F·L.
+    // A quarter of the square from the corner formula with A = B = ½/h, four times; E = π·F·L.
     for (height, exact) in [(1.0, 0.752_274_688_5), (4.0, 0.061_225_761_1), (0.1, 3.042_128)] {
         let a: f64 = 0.5 / height;
         let w = (1.0 + a * a).sqrt();
@@ -85,7 +85,7 @@ fn parallel_squares() {
 }
 
 #[test]
-fn a_perpendicular_square_that_touches_the_plane() {
+fn perpendicular_square_touching_the_plane() {
     // F = (atan 1 − atan(1/√2)/√2)/2π for all lengths 1.
     let exact = 0.5 * (PI / 4.0 - 0.5_f64.sqrt().atan() / 2.0_f64.sqrt());
     assert_close("the formula", exact, 0.175_094_143_9);
@@ -97,8 +97,8 @@ fn a_perpendicular_square_that_touches_the_plane() {
 }
 
 #[test]
-fn rectangles_near_and_far_long_and_grazing() {
-    // Lambert's formula for rectangles that float anywhere above the plane, turned towards the origin.
+fn rectangle_lights_match_lambert() {
+    // Lambert's formula for rectangles anywhere above the plane, facing the origin.
     for (corner, u, w) in [
         (v(0.3, 0.01, -0.5), v(0.0, 0.0, 1.0), v(0.0, 2.0, 0.0)),
         (v(0.02, 0.5, -5.0), v(0.0, 0.0, 10.0), v(0.1, 0.1, 0.0)),
@@ -118,7 +118,7 @@ fn rectangles_near_and_far_long_and_grazing() {
 }
 
 #[test]
-fn a_parallelogram_and_a_triangle() {
+fn parallelogram_and_triangle_lights() {
     let (corner, u, w) = (v(-0.4, 1.2, -0.3), v(1.0, 0.2, 0.3), v(0.4, -0.1, 1.1));
     let parallelogram = [corner, corner + u, corner + u + w, corner + w];
     let exact = lambert(DVec3::ZERO, DVec3::Y, &parallelogram);
@@ -143,7 +143,7 @@ fn convex(faces: impl IntoIterator<Item = Vec<DVec3>>) -> f64 {
 }
 
 #[test]
-fn an_emissive_box_shines_from_the_faces_that_are_seen() {
+fn box_light_shines_from_visible_faces() {
     let (center, half) = (v(0.9, 1.5, -0.4), v(0.4, 0.5, 0.3));
     let face = |axis: usize, sign: f64| {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -158,15 +158,15 @@ fn an_emissive_box_shines_from_the_faces_that_are_seen() {
     let exact = convex((0..3).flat_map(|axis| [face(axis, 1.0), face(axis, -1.0)]));
     let lit = at_origin().cuboid(center, half * 2.0, DVec3::ZERO, emitter(1.0));
     assert_irradiance("box", &lit, exact);
-    // Turned by quarters about y the box has its x and z edges exchanged.
+    // Rotated by a quarter turn about y, the box has its x and z edges exchanged.
     let turned = v(half.z, half.y, half.x) * 2.0;
     let lit = at_origin().cuboid(center, turned, v(0.0, 90.0, 0.0), emitter(1.0));
     assert_irradiance("turned box", &lit, exact);
 }
 
 #[test]
-fn an_emissive_mesh_placed_and_mirrored() {
-    // A closed ball of triangles: each triangle that looks at the origin counts, whole, since the ball is convex.
+fn transformed_and_mirrored_mesh_light() {
+    // A closed ball of triangles: each triangle that faces the origin counts fully, because the ball is convex.
     let ball = lat_long_sphere(6, 8, 0.5, DVec3::ZERO);
     let place = v(0.6, 1.6, 0.2);
     for scale in [v(1.0, 1.0, 1.0), v(1.0, 0.6, -1.3)] {
@@ -182,9 +182,9 @@ fn an_emissive_mesh_placed_and_mirrored() {
 }
 
 #[test]
-fn parts_of_a_mesh_hide_one_another() {
-    // Two squares of one mesh, shining down: the lower one, twice as wide at half the height, hides the upper one from the
-    // origin altogether.
+fn mesh_light_occludes_itself() {
+    // Two downward-facing squares of one mesh: the lower one, twice as wide at half the height, hides the upper one
+    // completely from the origin.
     let mut mesh = TriangleMesh::default();
     for (half, y) in [(0.5_f32, 1.0_f32), (0.5, 2.0)] {
         let first = mesh.positions.len() as u32;
@@ -198,8 +198,8 @@ fn parts_of_a_mesh_hide_one_another() {
 }
 
 #[test]
-fn spheres_at_every_height_over_the_horizon() {
-    // E/πL = cos θ/H² where the whole sphere is above the horizon; else the integral of the table, H = 2.
+fn sphere_lights_at_every_elevation() {
+    // E/πL = cos θ/H² where the whole sphere is above the horizon; otherwise the tabulated integral, H = 2.
     for (cosine, exact) in
         [(1.0, 0.25), (0.2, 0.059_345_832_4), (0.0, 0.028_834_442_8), (-0.3, 0.003_715_430_7)]
     {
@@ -213,7 +213,7 @@ fn spheres_at_every_height_over_the_horizon() {
 }
 
 #[test]
-fn spheres_far_away_and_close() {
+fn sphere_lights_near_and_far() {
     for (h, cosine) in [(1000.0, 0.6), (1e5, 0.6), (1.01, 1.0), (1.0001, 1.0), (1.25, 0.9)] {
         let direction = v((1.0_f64 - cosine * cosine).sqrt(), cosine, 0.0);
         let lit = at_origin().sphere(direction * h, 1.0, emitter(1.0));
@@ -221,7 +221,7 @@ fn spheres_far_away_and_close() {
     }
 }
 
-/// A unit square at height 4, half of the sky hidden by a blocker x < 0 at height 1.
+/// A unit square at height 4, half of the hemisphere hidden by a blocker x < 0 at height 1.
 fn penumbra(x: f64, blocker: bool) -> Build {
     let lit = receiver(v(x, 0.0, 0.0), 0.7).quad(v(-0.5, 4.0, -0.5), DVec3::X, DVec3::Z, emitter(1.0));
     let hide =
@@ -230,8 +230,8 @@ fn penumbra(x: f64, blocker: bool) -> Build {
 }
 
 #[test]
-fn the_penumbra_of_a_half_plane() {
-    // The line of sight over the edge meets the light at x' = −3x: what is right of it is seen.
+fn half_plane_penumbra_is_exact() {
+    // The line of sight over the edge meets the light at x' = −3x: everything to the right of it is visible.
     for (x, exact) in [
         (-1.0_f64 / 6.0, 0.0),
         (-1.0 / 12.0, 0.015_059_393_9),
@@ -246,7 +246,7 @@ fn the_penumbra_of_a_half_plane() {
         assert_irradiance(&format!("penumbra at {x}"), &penumbra(x, true), formula);
         let off = |blocker| penumbra(x, blocker).shadows(Shadows::Off, 4).values(8, 16);
         assert_eq!(off(true), off(false));
-        // The middle is hidden from x < 0; from x > 0 all counts.
+        // The center is hidden for x < 0; for x > 0 the whole light counts.
         let square = [v(-0.5, 4.0, -0.5), v(0.5, 4.0, -0.5), v(0.5, 4.0, 0.5), v(-0.5, 4.0, 0.5)];
         let hard = if x > 0.0 { lambert(v(x, 0.0, 0.0), DVec3::Y, &square) } else { 0.0 };
         if x != 0.0 {
@@ -256,14 +256,14 @@ fn the_penumbra_of_a_half_plane() {
 }
 
 #[test]
-fn the_view_of_shadows_is_the_part_that_arrives() {
-    // In the middle of the penumbra half of the light is seen, by symmetry.
+fn shadow_view_shows_the_visible_fraction() {
+    // In the middle of the penumbra half of the light is visible, by symmetry.
     for shadow_samples in [1, 16] {
         let view = penumbra(0.0, true).viewed(View::Shadow).shadows(Shadows::Soft, shadow_samples);
         assert_mean("half", &view.values(64, 64), 0.5);
     }
     assert_eq!(penumbra(0.3, true).viewed(View::Shadow).value(), 1.0);
-    // Two point lights, the one of E = 3/2² hidden, the one of E = 5/1 not: 5/(5 + ¾).
+    // Two point lights: the hidden one has E = 3/2², the visible one E = 5/1, so the fraction is 5/(5 + ¾).
     let lit = at_origin()
         .point_light(v(0.0, 2.0, 0.0), 3.0, Falloff::Square)
         .point_light(v(0.0, 1.0, 0.0), 5.0, Falloff::Square)
@@ -272,8 +272,8 @@ fn the_view_of_shadows_is_the_part_that_arrives() {
 }
 
 #[test]
-fn inside_a_box_of_uniform_light_a_diffuse_surface_sends_its_reflectance() {
-    // L = 1 over the whole hemisphere: E = π, so that L = ρ, wherever and however the surface is.
+fn diffuse_surface_in_uniform_light() {
+    // L = 1 over the whole hemisphere: E = π, so L = ρ, whatever the surface's position and orientation.
     for (point, size) in [(v(0.0, 0.0, 0.0), 2.0), (v(0.6, -0.7, 0.3), 1.0), (v(0.3, 0.9, -0.2), 1.0)] {
         let mut lit = receiver(point, 0.7);
         for axis in 0..3 {

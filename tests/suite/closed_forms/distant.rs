@@ -1,4 +1,4 @@
-//! Spotlights, and light from beyond the scene.
+//! Spotlights, and light from outside the scene.
 
 use std::f64::consts::PI;
 
@@ -10,19 +10,19 @@ use super::direct::at_origin;
 use super::scenes::{Build, matte, plain, receiver, scene};
 use super::{assert_close, assert_mean, v};
 
-/// Adds light from far away; `angle` is its apparent diameter in degrees.
+/// Adds a distant light; `angle` is its apparent diameter in degrees.
 pub fn sun(build: Build, direction: DVec3, irradiance: f32, angle: f64) -> Build {
     let light = DirectionalLight { direction, irradiance: Vec3::splat(irradiance), angle };
     build.with(|scene| scene.lights.push(Light::Directional(light)))
 }
 
 #[test]
-fn a_spotlight_is_a_point_light_that_fades_towards_the_edge_of_its_cone() {
+fn spotlight_fades_towards_its_cone() {
     // From height 2 above (1, 0, 0), aimed so that the origin is at an angle θ from the axis.
     let from = v(1.0, 2.0, 0.0);
     let lit = |theta: f64, angle: f64, blend: f32, falloff| {
         let (sin, cos) = theta.sin_cos();
-        // The way to the origin is (−1, −2)/√5; turned by θ it is the axis.
+        // The direction to the origin is (−1, −2)/√5; rotated by θ it is the axis.
         let (x, y) = (-1.0 / 5.0_f64.sqrt(), -2.0 / 5.0_f64.sqrt());
         let axis = v(x * cos - y * sin, x * sin + y * cos, 0.0);
         let point = PointLight { position: from, intensity: Vec3::splat(10.0), falloff };
@@ -52,13 +52,13 @@ fn a_spotlight_is_a_point_light_that_fades_towards_the_edge_of_its_cone() {
 }
 
 #[test]
-fn light_from_one_direction_is_the_same_everywhere() {
+fn directional_light_is_uniform() {
     let direction = v(3.0, -4.0, 0.0);
     for place in [DVec3::ZERO, v(1e3, 0.0, -50.0)] {
         for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
             let lit = sun(receiver(place, 0.7), direction, 5.0, 0.0).shadows(shadows, 3);
             assert_close("lit", lit.value(), 0.7 / PI * 5.0 * 0.8);
-            // In front of the light, and beside the way that it takes.
+            // In front of the light, and next to its rays.
             let blocked = |at: DVec3| lit.clone().sphere(place + at, 0.5, matte(0.5)).value();
             let expected = if shadows == Shadows::Off { lit.value() } else { 0.0 };
             assert_eq!(blocked(v(-300.0, 400.0, 0.0)), expected);
@@ -69,8 +69,8 @@ fn light_from_one_direction_is_the_same_everywhere() {
 }
 
 #[test]
-fn a_disc_of_light_brings_its_irradiance_and_soft_shadows() {
-    // All of the disc above the horizon: E = irradiance · cos θ of its middle. `hard` decides by the middle.
+fn sun_disk_gives_irradiance_and_soft_shadows() {
+    // The whole disk is above the horizon: E = irradiance · cos θ of its center. `hard` uses the center.
     for degrees in [0.53, 10.0, 60.0] {
         let lit = sun(at_origin(), v(1.0, -2.0, 0.0), 5.0, degrees);
         let expected = 0.7 / PI * 5.0 * 2.0 / 5.0_f64.sqrt();
@@ -78,14 +78,15 @@ fn a_disc_of_light_brings_its_irradiance_and_soft_shadows() {
         let hard = lit.clone().shadows(Shadows::Hard, 1);
         assert_mean(&format!("{degrees}, hard"), &hard.values(64, 64), expected);
     }
-    // A half plane whose edge crosses the middle of the disc hides half of it: from (0, 0, 0), straight above, x < 0 at 1.
+    // A half plane whose edge crosses the center of the disk hides half of it: from (0, 0, 0), straight above, x < 0 at
+    // 1.
     let overhead = sun(at_origin(), v(0.0, -1.0, 0.0), 5.0, 40.0);
     let half = overhead.quad(v(-100.0, 1.0, -100.0), v(100.0, 0.0, 0.0), v(0.0, 0.0, 200.0), matte(0.5));
     assert_mean("half", &half.values(64, 256), 0.7 / PI * 2.5);
 }
 
 #[test]
-fn a_disc_of_light_is_seen_by_rays_that_leave() {
+fn sun_disk_is_visible_to_escaping_rays() {
     // Radiance E/(π sin²(α/2)); the camera looks along −z, and the light travels along z.
     let radiance = |angle: f64| 5.0 / (PI * (angle.to_radians() / 2.0).sin().powi(2));
     for angle in [0.53, 20.0, 180.0] {

@@ -1,5 +1,5 @@
-//! Keys of every surface, on metals, plastics and principled materials, smooth and rough: opacity, vertex colours, and
-//! emission on both sides.
+//! Keys of every surface on metals, plastics and principled materials, smooth and rough: opacity, vertex colors, and
+//! two-sided emission.
 
 use std::f64::consts::PI;
 
@@ -25,7 +25,7 @@ fn materials() -> [(&'static str, Material); 6] {
     ]
 }
 
-/// The material without a clear coat, which weakens what it emits.
+/// The material without its clear coat, which attenuates the emission.
 fn uncoated(mut material: Material) -> Material {
     if let MaterialKind::Principled { clearcoat, .. } = &mut material.kind {
         *clearcoat = NumberSource::Constant(0.0);
@@ -33,13 +33,13 @@ fn uncoated(mut material: Material) -> Material {
     material
 }
 
-/// The same scene by every integrator.
+/// The same scene with every integrator.
 fn each(build: &Build) -> [(&'static str, Build); 3] {
     let path = build.clone().with(|scene| scene.render.integrator = Integrator::Path);
     [("whitted", build.clone()), ("path", path), ("photons", build.clone().photons(256, 0.1))]
 }
 
-/// A square of 2 × 2 as a mesh at the origin, facing up, seen from above under a light.
+/// A mesh of a 2 × 2 square at the origin, facing up, seen from above under a light.
 fn square(material: Material, color: Option<[u8; 3]>) -> Build {
     let mesh = TriangleMesh {
         positions: [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]
@@ -61,7 +61,7 @@ fn square(material: Material, color: Option<[u8; 3]>) -> Build {
 }
 
 #[test]
-fn half_of_the_opacity_is_half_of_the_light() {
+fn half_opacity_gives_half_the_light() {
     for (name, material) in materials() {
         let veiled = |opacity: f32| {
             let opacity = OpacitySource { value: NumberSource::Constant(opacity), cutoff: 0.0 };
@@ -79,19 +79,19 @@ fn half_of_the_opacity_is_half_of_the_light() {
 }
 
 #[test]
-fn emission_of_both_sides_and_half_opacity() {
+fn two_sided_emission_with_half_opacity() {
     for (name, material) in materials() {
         for (sides, of_back) in [(EmissionSides::Both, 1.0), (EmissionSides::Front, 0.0)] {
             let emission = EmissionSource { sides, ..EmissionSource::constant(Vec3::splat(2.0)) };
             let opacity = OpacitySource { value: NumberSource::Constant(0.5), cutoff: 0.0 };
             let shining = Material { emission, opacity, ..uncoated(material.clone()) };
-            // On the axis of a disk E = π·r²/(r² + h²) · L: here π/5 · 2, by half, on either side.
+            // On the axis of a disk E = π·r²/(r² + h²) · L: here π/5 · 2, halved, on either side.
             let disk = |normal| Shape::Disk { center: v(0.0, 2.0, 0.0), normal, radius: 1.0 };
             for (normal, part) in [(DVec3::NEG_Y, 1.0), (DVec3::Y, of_back)] {
                 let lit = receiver(DVec3::ZERO, 0.7).shape(disk(normal), shining.clone()).depth(1);
                 let exact = 0.7 / PI * (PI / 5.0) * part;
                 for (integrator, build) in each(&lit) {
-                    let what = format!("{name} by {integrator}, {sides:?}");
+                    let what = format!("{name} with {integrator}, {sides:?}");
                     let values = build.values(64, 64);
                     if part == 0.0 {
                         assert!(values.iter().all(|value| *value == 0.0), "{what}");
@@ -99,14 +99,14 @@ fn emission_of_both_sides_and_half_opacity() {
                         assert_mean(&what, &values, exact);
                     }
                 }
-                // Seen itself: half of its radiance.
+                // Seen directly: half of its radiance.
                 let seen =
                     scene().shape(disk(normal), shining.clone()).depth(0).seen(DVec3::ZERO, v(0.0, 2.0, 0.1));
                 for (integrator, build) in each(&seen) {
                     let values = build.values(64, 64);
                     match part == 0.0 {
                         true => assert!(values.iter().all(|value| *value == 0.0), "{name} by {integrator}"),
-                        false => assert_mean(&format!("{name} seen by {integrator}"), &values, 1.0),
+                        false => assert_mean(&format!("{name} seen with {integrator}"), &values, 1.0),
                     }
                 }
             }
@@ -115,8 +115,8 @@ fn emission_of_both_sides_and_half_opacity() {
 }
 
 #[test]
-fn vertex_colours_multiply_the_colour_of_metals_and_bases() {
-    // In sRGB 188 is 0.5029 in linear light.
+fn vertex_colors_multiply_metal_and_base_color() {
+    // In sRGB, 188 is 0.5029 in linear light.
     let linear = f64::from(((188.0_f32 / 255.0 + 0.055) / 1.055).powf(2.4));
     let grey = |material: Material| square(material, Some([188; 3]));
     for (name, colored, equal) in [
@@ -129,12 +129,12 @@ fn vertex_colours_multiply_the_colour_of_metals_and_bases() {
         let exact = square(equal, None).value();
         assert!(
             (square(colored.clone(), None).value() / exact - 1.0).abs() > 0.05,
-            "{name}: the colour matters"
+            "{name}: the color matters"
         );
         for (integrator, build) in each(&grey(colored)) {
             let (mean, error) = mean_and_error(&build.values(16, 64));
             let most = 3.5 * error + 1e-3 * exact;
-            assert!((mean - exact).abs() < most, "{name} by {integrator}: {mean} ± {error}, not {exact}");
+            assert!((mean - exact).abs() < most, "{name} with {integrator}: {mean} ± {error}, not {exact}");
         }
     }
 }

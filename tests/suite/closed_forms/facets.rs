@@ -1,4 +1,4 @@
-//! Light at the facets of smooth meshes: none inside what is closed, none missing on what bulges.
+//! Light on the facets of smooth meshes: none inside closed meshes, none missing on convex ones.
 
 use std::f64::consts::PI;
 
@@ -11,14 +11,14 @@ use glimt::scene::description::{Bump, NormalMap, Shadows, TextureFilter, Wrap};
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};
 
-/// Number of lit pixels of a picture, and the largest value.
+/// Number of lit pixels of an image, and the largest value.
 fn lit(build: &Build) -> (usize, f64) {
     let picture = build.picture(1, 0);
     let most = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
     (picture.iter().filter(|color| color.max_element() > 0.0).count(), most)
 }
 
-/// The box between two corners, by eight vertices and twelve triangles that face outwards.
+/// The box between two corners, with eight vertices and twelve outward-facing triangles.
 fn cube(least: DVec3, greatest: DVec3) -> TriangleMesh {
     let corner = |i: usize| {
         let pick = |axis: usize| if i & (1 << axis) == 0 { least[axis] } else { greatest[axis] };
@@ -30,7 +30,7 @@ fn cube(least: DVec3, greatest: DVec3) -> TriangleMesh {
 }
 
 #[test]
-fn a_smooth_cube_that_is_lit_from_outside_is_dark_inside() {
+fn smooth_cube_lit_from_outside_is_dark_inside() {
     for light in [v(3.0, 4.0, 2.0), v(-2.0, 0.1, 0.3), v(0.3, 1.2, -5.0)] {
         let build = scene()
             .mesh(cube(DVec3::splat(-1.0), DVec3::ONE), AS_IT_IS, matte(0.8))
@@ -42,8 +42,8 @@ fn a_smooth_cube_that_is_lit_from_outside_is_dark_inside() {
 }
 
 #[test]
-fn no_light_of_outside_reaches_a_smooth_ball_in_a_close_shell() {
-    // The middle of a facet of the ball, the gap between it and the shell, and the light.
+fn smooth_ball_in_a_close_shell_is_dark() {
+    // The center of a facet of the ball, the gap between it and the shell, and the light.
     for gap in [0.02, 0.002] {
         let ball = lat_long_sphere(7, 12, 1.0, DVec3::ZERO);
         let out = v((PI / 12.0).cos(), 0.0, (PI / 12.0).sin());
@@ -57,9 +57,9 @@ fn no_light_of_outside_reaches_a_smooth_ball_in_a_close_shell() {
     }
 }
 
-/// A smooth ball of 200 triangles, with its own normals.
+/// A smooth ball of 200 triangles with vertex normals.
 #[test]
-fn a_coarse_smooth_ball_is_shaded_like_a_sphere() {
+fn coarse_smooth_ball_is_shaded_like_a_sphere() {
     let mut ball = lat_long_sphere(6, 20, 1.0, DVec3::ZERO);
     assert_eq!(ball.triangles.len(), 200);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();
@@ -88,7 +88,7 @@ fn a_coarse_smooth_ball_is_shaded_like_a_sphere() {
     }
 }
 
-/// A closed surface around the middle whose radius is anything from `1 − rough` to `1 + rough`.
+/// A closed surface around the center, with random radii from `1 − rough` to `1 + rough`.
 fn blob(random: &mut Random, rough: f64) -> TriangleMesh {
     let (rings, steps) = (3 + (random.unit() * 6.0) as u32, 3 + (random.unit() * 8.0) as u32);
     let mut mesh = match (random.unit() * 5.0) as u32 {
@@ -119,11 +119,11 @@ fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
     mesh
 }
 
-/// Distance from the middle to the nearest surface in a direction.
+/// Distance from the center to the nearest surface in a direction.
 fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
     let world = scene().mesh(mesh.clone(), AS_IT_IS, matte(0.5)).world();
     let hit = world.geometry.closest(&Ray::new(Vec3::ZERO, direction.as_vec3()));
-    f64::from(hit.expect("the middle is inside").shape.t)
+    f64::from(hit.expect("the center is inside").shape.t)
 }
 
 /// A closed opaque mesh of kind `number`, with a camera inside and lights outside.
@@ -132,7 +132,7 @@ fn closed(number: u32, random: &mut Random) -> Build {
     let mesh = blob(random, rough);
     let towards = random.direction();
     let gap = 10.0_f64.powf(-1.0 - 3.0 * random.unit());
-    // A single wall; a shell of two; in between two shells, near the outer or the inner one.
+    // A single wall; a shell of two; a camera between two shells, near the outer or the inner one.
     let (walls, eye) = match number % 5 {
         0 => (vec![mesh], towards * 0.1 * random.unit()),
         1 => (
@@ -167,7 +167,7 @@ fn closed(number: u32, random: &mut Random) -> Build {
             wall.normals = wall.positions.iter().map(any).collect();
         }
         let mut material = matte(0.8);
-        // Any numbers serve as normals and as heights.
+        // Any numbers are valid normals and heights.
         let as_heights = bumps.filter(|_| number % 8 == 3);
         material.bump = as_heights.map(|texture| Bump { texture, channel: None, scale: 0.3 });
         material.normal_map = bumps.map(|texture| NormalMap { texture, strength: 2.0 });
@@ -189,10 +189,10 @@ fn closed(number: u32, random: &mut Random) -> Build {
     build.shadows(Shadows::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
 }
 
-/// Checks a thousand closed opaque meshes, smooth and flat, with bent normals, single walls and shells, round and rough,
-/// lit from outside by points and lamps: no pixel is lit inside.
+/// Checks a thousand closed opaque meshes, smooth and flat, with perturbed normals, single walls and shells, round and
+/// rough, lit from outside by point and area lights: no pixel is lit inside.
 #[test]
-fn no_light_reaches_the_inside_of_a_closed_opaque_mesh() {
+fn no_light_enters_a_closed_opaque_mesh() {
     let mut random = Random(77);
     let mut leaky = Vec::new();
     for number in 0..1000 {

@@ -1,4 +1,4 @@
-//! Scenes far from the origin look as they do near it.
+//! Scenes far from the origin look the same as near it.
 
 use std::path::Path;
 
@@ -19,8 +19,8 @@ fn difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     (off / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
 }
 
-/// Every shape, some of them lamps, a mesh and a point light, of size 8, with the origin moved. All numbers are multiples of
-/// 1/1024, so that the sums are exact.
+/// Every shape, some of them emitting, a mesh and a point light, of size 8, with a moved origin. All numbers are
+/// multiples of 1/1024, so that sums are exact.
 fn everything_at(at: DVec3, accel: Accel) -> Build {
     let p = |x: f64, y: f64, z: f64| at + (v(x, y, z) * 1024.0).round() / 1024.0;
     let d = |x: f64, y: f64, z: f64| (v(x, y, z) * 1024.0).round() / 1024.0;
@@ -81,7 +81,7 @@ fn everything_at(at: DVec3, accel: Accel) -> Build {
 }
 
 #[test]
-fn a_scene_moved_far_away_looks_the_same() {
+fn scene_far_from_the_origin_looks_the_same() {
     for accel in [Accel::Bvh, Accel::KdTree] {
         let near = everything_at(DVec3::ZERO, accel).picture(4, 3);
         for far in [1e4, 1e6, 1e8] {
@@ -93,7 +93,7 @@ fn a_scene_moved_far_away_looks_the_same() {
 }
 
 #[test]
-fn one_object_far_away_spoils_nothing_near() {
+fn distant_object_keeps_near_precision() {
     for accel in [Accel::Bvh, Accel::KdTree] {
         let near = everything_at(DVec3::ZERO, accel).picture(4, 3);
         let far = v(1e8, 2e7, 3e7);
@@ -110,8 +110,8 @@ fn one_object_far_away_spoils_nothing_near() {
 }
 
 #[test]
-fn the_tiles_of_a_plane_stay_where_they_are_far_from_its_point() {
-    // The period of the picture is a tile, and a move by whole tiles shows the same.
+fn plane_texture_stays_in_place_far_away() {
+    // The texture's period is one tile, so a move by whole tiles shows the same image.
     for (wrap, repeat) in
         [(Wrap::Repeat, Vec2::ONE), (Wrap::Mirror, Vec2::splat(2.0)), (Wrap::Repeat, Vec2::splat(0.25))]
     {
@@ -163,7 +163,7 @@ fn text_of(mesh: &TriangleMesh, at: DVec3, ending: &str) -> String {
 }
 
 #[test]
-fn mesh_files_keep_vertices_that_are_far_from_the_origin() {
+fn mesh_files_keep_distant_vertices() {
     let mut ball = lat_long_sphere(12, 16, 1.0, DVec3::ZERO);
     ball.positions.iter_mut().for_each(|p| *p = (*p * 1024.0).round() / 1024.0);
     let seen = |build: Build, at: DVec3| {
@@ -171,7 +171,7 @@ fn mesh_files_keep_vertices_that_are_far_from_the_origin() {
             .smooth()
             .point_light(at + v(2.0, 3.0, 1.0), 30.0, Falloff::Square)
             .pictured(at + v(0.5, 1.0, 3.0), at, 50.0, 32, 32)
-            // By seed 1 a sample falls on the very edge of a facet, which rounding tips over.
+            // With seed 1, a sample falls exactly on the edge of a facet, where rounding decides.
             .picture(2, 2)
     };
     let near = seen(scene().mesh(ball.clone(), AS_IT_IS, matte(0.8)), DVec3::ZERO);
@@ -182,7 +182,7 @@ fn mesh_files_keep_vertices_that_are_far_from_the_origin() {
             std::fs::write(&path, text_of(&ball, far, ending)).expect("written");
             let loaded = load(Path::new(&path), &ignore_progress, &CancelToken::new()).expect("a mesh");
             assert_eq!(loaded.mesh.triangles.len(), ball.triangles.len(), "{ending}");
-            // Where the file has it, and moved back by the scene.
+            // At its position in the file, and moved back by the scene.
             let off = difference(&seen(scene().loaded(loaded.clone(), AS_IT_IS, matte(0.8)), far), &near);
             assert!(off <= 1e-3, "{ending} at {far}: {off}");
             let back = [DVec3::ONE, DVec3::ZERO, -far];

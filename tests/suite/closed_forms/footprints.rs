@@ -9,7 +9,7 @@ use glimt::scene::description::{
 use super::scenes::{Build, emitter, lat_long_sphere, matte, mirror, phong, plain, scene};
 use super::{mean_and_error, v};
 
-/// A checker board of squares of 16 texels, black and white, tiled.
+/// A tiled checkerboard of black and white squares of 16 texels.
 fn checkers(build: &mut Build, filter: TextureFilter, repeat: f32) -> usize {
     let rows: Vec<Vec<Vec3>> = (0..32)
         .map(|y| (0..32).map(|x| Vec3::splat(if (x / 16 + y / 16) % 2 == 0 { 0.0 } else { 1.0 })).collect())
@@ -18,7 +18,7 @@ fn checkers(build: &mut Build, filter: TextureFilter, repeat: f32) -> usize {
     build.texture(&rows, filter, Wrap::Repeat, Vec2::splat(repeat))
 }
 
-/// The board under ambient light alone.
+/// The board under ambient light only.
 fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = checkers(&mut build, filter, repeat);
@@ -29,7 +29,7 @@ fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
     (build, kind)
 }
 
-/// A floor of tiles of one unit, 200 units on a side.
+/// A floor of unit tiles, 200 units on a side.
 fn floor(filter: TextureFilter) -> Build {
     let (build, kind) = board(filter, 200.0);
     build.quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), kind)
@@ -40,8 +40,8 @@ fn greys(build: &Build) -> Vec<f64> {
 }
 
 #[test]
-fn a_far_board_is_grey_by_one_sample() {
-    // From 60 away a pixel of 40°/16 is 2.6 units wide at least.
+fn distant_board_is_gray_after_one_sample() {
+    // From 60 units away, a pixel of 40°/16 is at least 2.6 units wide.
     let seen = |filter| greys(&floor(filter).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16));
     let off = |values: &[f64]| values.iter().map(|x| (x - 0.5).abs()).fold(0.0, f64::max);
     let mipmapped = seen(TextureFilter::Mipmap);
@@ -54,7 +54,7 @@ fn a_far_board_is_grey_by_one_sample() {
 type Textured = (&'static str, fn(texture: usize) -> Material);
 
 #[test]
-fn far_boards_are_grey_whatever_they_colour() {
+fn distant_boards_are_gray_for_every_key() {
     let materials: [Textured; 4] = [
         ("diffuse", |board| {
             let diffuse = ColorSource::Texture(board);
@@ -72,7 +72,7 @@ fn far_boards_are_grey_whatever_they_colour() {
     for (what, material) in materials {
         let mut build = scene().background(1.0).with(|scene| scene.render.ambient = Vec3::ONE);
         let board = checkers(&mut build, TextureFilter::Mipmap, 200.0);
-        // Beside it is a material without a texture.
+        // Next to it is a material without a texture.
         let build = build
             .quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), material(board))
             .sphere(v(0.0, 90.0, 0.0), 1.0, matte(0.5))
@@ -84,8 +84,8 @@ fn far_boards_are_grey_whatever_they_colour() {
 }
 
 #[test]
-fn between_near_and_far_it_fades() {
-    // Pixels of 1°: half a square is 0.25 units, which is a pixel at 14.3.
+fn mip_levels_fade_with_distance() {
+    // Pixels of 1°: half a square is 0.25 units, which is one pixel at a distance of 14.3.
     let contrast = |distance: f64| {
         let eye = v(0.25, distance, -50.25);
         let build = floor(TextureFilter::Mipmap).pictured(eye, v(0.25, 0.0, -50.25), 1.0, 1, 1);
@@ -98,13 +98,13 @@ fn between_near_and_far_it_fades() {
 }
 
 #[test]
-fn near_it_is_the_image_itself() {
+fn near_texture_shows_its_texels() {
     let seen = |filter| greys(&floor(filter).pictured(v(0.3, 0.4, -50.0), v(0.4, 0.0, -50.2), 3.0, 16, 16));
     assert_eq!(seen(TextureFilter::Mipmap), seen(TextureFilter::Bilinear));
 }
 
 #[test]
-fn one_colour_stays_whatever_its_level() {
+fn constant_texture_is_constant_at_every_level() {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = build.texture(
         &[&[Vec3::splat(0.3); 7][..]; 5],
@@ -123,8 +123,8 @@ fn one_colour_stays_whatever_its_level() {
 }
 
 #[test]
-fn in_a_flat_mirror_it_is_as_in_the_unfolded_view() {
-    // The mirror is at z = −5; what is at z is seen at −10 − z.
+fn flat_mirror_keeps_the_mip_level() {
+    // The mirror is at z = −5; a point at z appears at −10 − z.
     let unfolded = |p: DVec3| v(p.x, p.y, -10.0 - p.z);
     let (corner, u, w) = (v(-40.0, -30.0, 12.0), v(80.0, 0.0, 8.0), v(0.0, 60.0, 3.0));
     let eye = v(0.0, 0.0, 0.0);
@@ -145,15 +145,15 @@ fn in_a_flat_mirror_it_is_as_in_the_unfolded_view() {
     };
     let (mirrored, plain) = (picture(true), picture(false));
     let grey = |picture: &[DVec3]| picture.iter().filter(|color| color.x > 0.05 && color.x < 0.95).count();
-    assert!(grey(&plain) > 100, "levels between are looked up");
+    assert!(grey(&plain) > 100, "intermediate levels are used");
     for (a, b) in mirrored.iter().zip(&plain) {
         assert!((*a - *b).abs().max_element() < 5e-3, "{a} {b}");
     }
 }
 
 #[test]
-fn a_ball_spreads_what_it_mirrors_as_its_facets_with_normals_do() {
-    // Surround the camera with a board. In the ball, which shows it small, all is grey; in a flat mirror it is not.
+fn mirror_ball_matches_its_smooth_mesh() {
+    // Surround the camera with a board. In the ball, which shrinks it, everything is gray; in a flat mirror it is not.
     let (build, kind) = board(TextureFilter::Mipmap, 12.0);
     let room =
         |build: Build| build.quad(v(-30.0, -30.0, 9.0), v(60.0, 0.0, 0.0), v(0.0, 60.0, 0.0), kind.clone());
@@ -170,15 +170,15 @@ fn a_ball_spreads_what_it_mirrors_as_its_facets_with_normals_do() {
 }
 
 #[test]
-fn views_look_it_up_alike() {
+fn views_use_the_same_mip_level() {
     let far = floor(TextureFilter::Mipmap).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 8, 8);
     let albedo = greys(&far.clone().viewed(View::Albedo));
     assert_eq!(albedo, greys(&far));
 }
 
 #[test]
-fn paths_agree_with_sharp_look_ups_on_what_a_board_throws_back() {
-    // A wall lit through a board on the floor: levels at the second hit keep the mean of what arrives.
+fn path_bounces_agree_with_sharp_lookups() {
+    // A wall lit through a board on the floor: mip levels at the second hit preserve the mean irradiance.
     let lit = |filter| {
         let (build, kind) = board(filter, 4.0);
         build

@@ -1,4 +1,4 @@
-//! Light that comes through rough surfaces: rough glass, and principled materials that transmit.
+//! Light transmitted by rough surfaces: rough glass, and principled materials with transmission.
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
@@ -14,7 +14,7 @@ use super::scenes::{
 };
 use super::{assert_close, mean_and_error, v};
 
-/// Half a world of a material below y = 0, or a sheet there, seen from a side: above or below it, towards the middle.
+/// A half-space of a material below y = 0, seen from above or below, looking at the origin.
 fn boundary(material: Material, side: f64) -> Build {
     let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
     let build = scene().shape(plane, material);
@@ -26,12 +26,13 @@ fn sheet(material: Material) -> Build {
     quad.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
 }
 
-/// Boundaries seen from above and from below, with their lamps on the other side: where refraction leads to, and so large.
+/// Boundaries seen from above and below, each with an area light of a matching size on the other side, in the direction
+/// of refraction.
 fn boundaries() -> Vec<(String, Build, DVec3)> {
     let mut all = Vec::new();
     for roughness in [0.1, 0.3, 0.6, 1.0] {
         let glass = frosted(1.5, roughness);
-        // sin 45°/1.5, and from inside a steeper way that is not reflected totally.
+        // sin 45°/1.5; from inside, a steeper direction without total internal reflection.
         all.push((
             format!("glass {roughness} from outside"),
             boundary(glass.clone(), 1.0),
@@ -46,13 +47,13 @@ fn boundaries() -> Vec<(String, Build, DVec3)> {
 }
 
 #[test]
-fn every_technique_finds_the_same_light_that_comes_through() {
+fn techniques_agree_on_transmitted_light() {
     for (what, build, at) in boundaries() {
         let lit = build.clone().sphere(at, 0.5, emitter(2.0));
         let path = mean_and_error(&by_paths(lit.clone(), 1).values(1024, 16));
         let whitted = lit.clone().depth(1);
         let sampled = whitted.clone().shadows(Shadows::Off, 1);
-        // Light samples do not find a lamp behind a boundary without refraction: samples of lobes do.
+        // Light samples cannot find a light behind a boundary without refraction, but lobe samples can.
         let inside = what.contains("from outside");
         let shell = glass(if inside { 1.5 } else { 1.0 });
         let hidden = by_paths(lit.clone().sphere(at, 0.55, shell), 2);
@@ -70,8 +71,8 @@ fn every_technique_finds_the_same_light_that_comes_through() {
 }
 
 #[test]
-fn lamps_of_every_kind_shine_through() {
-    // Light samples and samples of lobes, weighed, against lobes alone; many lamps, of which vertices pick some.
+fn every_light_shines_through_rough_glass() {
+    // MIS of light samples and lobe samples against lobe samples only; many lights, of which vertices sample some.
     for (what, build, at) in boundaries().into_iter().skip(3).take(3) {
         let lamps = |build: Build| {
             (0..12_u32).fold(build, |build, number| {
@@ -95,8 +96,8 @@ fn lamps_of_every_kind_shine_through() {
 }
 
 #[test]
-fn whitted_follows_rough_glass_as_paths_do() {
-    // A slab with lamps on both sides: all lobes are those of microfacets.
+fn whitted_follows_rough_glass_like_path() {
+    // A slab with lights on both sides: all lobes are microfacet lobes.
     for roughness in [0.1, 0.4, 0.8] {
         let build = scene()
             .cuboid(DVec3::ZERO, v(4.0, 0.3, 4.0), DVec3::ZERO, frosted(1.5, roughness))
@@ -108,7 +109,7 @@ fn whitted_follows_rough_glass_as_paths_do() {
             let whitted = mean_and_error(&build.clone().depth(depth).values(1024, 16));
             let path = mean_and_error(&by_paths(build.clone(), depth).values(1024, 16));
             let error = whitted.1.hypot(path.1);
-            let what = format!("roughness {roughness}, depth {depth}: {whitted:?}, by paths {path:?}");
+            let what = format!("roughness {roughness}, depth {depth}: {whitted:?}, path-traced {path:?}");
             assert!(error < 0.02 * path.0, "{what}");
             assert!((whitted.0 - path.0).abs() < 5.0 * error, "{what}");
         }
@@ -116,8 +117,8 @@ fn whitted_follows_rough_glass_as_paths_do() {
 }
 
 #[test]
-fn nothing_is_brighter_for_rough_glass_under_an_even_sky() {
-    // Microfacets lose what they would scatter twice, and the narrowest hardly any.
+fn rough_glass_adds_no_light_in_a_furnace() {
+    // Microfacet models lose multiple scattering, hardly any for the narrowest lobes.
     for (roughness, least) in [(0.01, 0.999), (0.2, 0.97), (0.5, 0.6), (1.0, 0.2)] {
         for (what, material) in [
             ("glass", frosted(1.5, roughness)),
@@ -130,9 +131,9 @@ fn nothing_is_brighter_for_rough_glass_under_an_even_sky() {
                 .seen(DVec3::ZERO, v(0.3, 0.1, -4.0));
             for (integrator, build) in [("whitted", build.clone().depth(64)), ("path", by_paths(build, 64))] {
                 let (mean, error) = mean_and_error(&build.values(512, 16));
-                let told = format!("{what} of {roughness}, {integrator}: {mean} ± {error}");
+                let told = format!("{what}, roughness {roughness}, {integrator}: {mean} ± {error}");
                 assert!(mean < 1.0 + 4.0 * error + 1e-3, "{told}");
-                // A sheet is no whole sphere of light: it has a clear coat, and loses light at each side.
+                // A sheet is no closed furnace: it has a clear coat, and loses light on each side.
                 assert!(what == "a sheet" || mean > least, "{told}");
             }
         }
@@ -140,7 +141,7 @@ fn nothing_is_brighter_for_rough_glass_under_an_even_sky() {
 }
 
 #[test]
-fn rough_glass_that_does_not_refract_is_no_boundary() {
+fn rough_glass_of_index_one_is_no_boundary() {
     let build = scene()
         .background(0.7)
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.0, 0.5))
@@ -150,9 +151,9 @@ fn rough_glass_that_does_not_refract_is_no_boundary() {
 }
 
 #[test]
-fn of_touching_glasses_the_later_one_is_rough_or_smooth() {
-    // The background is seen by smooth glass alone. A frosted box in a smooth one, which is larger and comes later: all of it is
-    // smooth glass. The other way round, its outside is rough.
+fn later_touching_glass_decides_the_roughness() {
+    // Only smooth glass shows the background. A frosted box inside a larger smooth one that comes later: everything is
+    // smooth glass. In the other order, its outside is rough.
     let smooth = |build: Build| build.cuboid(v(0.0, 0.0, -5.0), v(2.0, 2.0, 2.0), DVec3::ZERO, glass(1.5));
     let frost = |build: Build, size: f64| {
         build.cuboid(v(0.0, 0.0, -5.0), DVec3::splat(size), DVec3::ZERO, frosted(1.5, 0.5))
@@ -166,14 +167,14 @@ fn of_touching_glasses_the_later_one_is_rough_or_smooth() {
     assert_eq!(rough, 0.0, "a rough surface shows no background");
     let half = seen(frost(smooth(scene()), 1.0)).value();
     assert_close("a frosted core of the same index", half, reference);
-    // Water on frosted glass: the surface between them is that of the water.
+    // Water on frosted glass: the surface between them belongs to the water.
     let slab = |build: Build, material: Material, low: f64, high: f64| {
         build.cuboid(v(0.0, 0.5 * (low + high), 0.0), v(8.0, high - low, 8.0), DVec3::ZERO, material)
     };
     let seen = |build: Build| build.background(1.0).seen(v(0.3, 5.0, 0.1), v(0.0, 2.0, 0.0)).depth(16);
     let wet =
         slab(slab(slab(scene(), glass(1.5), 0.0, 1.0), frosted(1.5, 0.5), 0.5, 1.5), glass(1.33), 1.5, 2.0);
-    // The frosted glass has no rough boundary but that to the water, which comes later: everything is smooth.
+    // The frosted glass has no rough boundary except with the water, which comes later: everything is smooth.
     let smooth = slab(slab(scene(), glass(1.5), 0.0, 1.5), glass(1.33), 1.5, 2.0);
     let (wet, smooth) = (seen(wet), seen(smooth));
     let means = [wet, smooth].map(|build| mean_and_error(&build.values(256, 16)));
@@ -182,7 +183,7 @@ fn of_touching_glasses_the_later_one_is_rough_or_smooth() {
     assert!(means[1].0 > 0.9, "{means:?}");
 }
 
-/// A box of walls with a lamp behind frosted glass, beside a mirror ball and one of smooth glass, which throw caustics.
+/// A room with a light behind frosted glass, next to a mirror ball and a smooth glass ball, which cast caustics.
 fn room() -> Build {
     scene()
         .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.6))
@@ -197,7 +198,7 @@ fn room() -> Build {
 }
 
 #[test]
-fn photons_and_paths_see_the_same_light_through_rough_glass() {
+fn photons_match_path_through_rough_glass() {
     for depth in [1, 2, 3, 5] {
         let means = both(&room().depth(depth), depth, [128, 16], (8_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
@@ -205,14 +206,15 @@ fn photons_and_paths_see_the_same_light_through_rough_glass() {
 }
 
 #[test]
-fn photons_scatter_at_rough_glass_to_both_sides() {
-    // All light comes from a lamp in a shell without refraction: photons bring it to a frosted plane and a sheet, which throw it on.
+fn photons_scatter_to_both_sides_of_rough_glass() {
+    // All light comes from a light in a shell without refraction: photons carry it to a frosted plane and a sheet,
+    // which scatter it.
     let at = v(0.0, 1.2, 0.0);
     let room = |depth: u32| {
         scene()
             .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.8))
             .cuboid(v(-0.4, 0.3, 0.0), v(0.6, 0.2, 0.6), DVec3::ZERO, frosted(1.5, 0.9))
-            // In the glass, where light is brighter by the square of its index.
+            // Inside the glass, where radiance is higher by the square of its index.
             .cuboid(v(-0.4, 0.25, 0.0), v(0.55, 0.08, 0.55), DVec3::ZERO, matte(0.9))
             .quad(v(0.1, 0.4, 0.4), v(0.6, 0.0, 0.0), v(0.0, 0.0, -0.8), translucent(0.9, 0.9, 0.8))
             .sphere(at, 0.2, emitter(8.0))
@@ -227,7 +229,7 @@ fn photons_scatter_at_rough_glass_to_both_sides() {
 }
 
 #[test]
-fn the_parts_of_pictures_of_frosted_glass_add_up() {
+fn frosted_glass_components_add_up() {
     let build = room()
         .sphere(v(0.3, 0.9, 0.3), 0.2, metal(0.9, 0.3, 0.0))
         .environment(0.2)
@@ -247,8 +249,8 @@ fn the_parts_of_pictures_of_frosted_glass_add_up() {
 }
 
 #[test]
-fn a_share_of_light_arrives_at_rough_glass_as_at_other_surfaces() {
-    // The lamp is in sight of every point of the box's top.
+fn shadow_view_counts_light_on_rough_glass() {
+    // The light is visible from every point of the box's top.
     let build = scene()
         .cuboid(DVec3::ZERO, v(2.0, 0.2, 2.0), DVec3::ZERO, frosted(1.5, 0.5))
         .sphere(v(0.0, 2.0, 0.0), 0.3, emitter(2.0))
@@ -258,8 +260,8 @@ fn a_share_of_light_arrives_at_rough_glass_as_at_other_surfaces() {
 }
 
 #[test]
-fn a_clear_coat_weakens_what_shines_below_it() {
-    // By 1 − c·E(μ), where a smooth enough coat has E = F0 + (1 − F0)(1 − μ)⁵ with F0 = .04, and c = ½.
+fn clear_coat_attenuates_emission() {
+    // By 1 − c·E(μ), where a sufficiently smooth coat has E = F0 + (1 − F0)(1 − μ)⁵ with F0 = 0.04, and c = ½.
     let left = |cosine: f64| 1.0 - 0.5 * (0.04 + 0.96 * (1.0 - cosine).powi(5));
     let coated = |radiance: f32| {
         let mut lamp = translucent(0.0, 0.5, 0.0);
@@ -278,7 +280,7 @@ fn a_clear_coat_weakens_what_shines_below_it() {
             assert!((value / (3.0 * left(cosine)) - 1.0).abs() < 4e-3, "{cosine}: {value}");
         }
     }
-    // What it throws on a floor: light samples, samples of lobes, and photons behind glass without refraction.
+    // The light it casts on a floor: light samples, lobe samples, and photons behind glass without refraction.
     let shapes = [
         Shape::Quad { corner: v(-0.5, 1.0, -0.5), u: v(1.0, 0.0, 0.0), v: v(0.0, 0.0, 1.0) },
         Shape::Box { center: v(0.0, 1.0, 0.0), size: DVec3::splat(0.5), rotate: v(10.0, 30.0, 0.0) },
@@ -299,11 +301,11 @@ fn a_clear_coat_weakens_what_shines_below_it() {
             mean_and_error(&(0..16).map(means).collect::<Vec<_>>())
         };
         let samples = means(&lit, 32);
-        // Light samples do not find a lamp in a shell of glass.
+        // Light samples do not find a light inside a glass shell.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
         let photons = hidden.clone().depth(3).photons(5_000, 0.2);
         let mut found = vec![("path", means(&by_paths(lit, 1), 64)), ("photons", means(&photons, 16))];
-        // Samples of lobes alone, the dearest, meet one of the shapes.
+        // Lobe samples only, the most expensive technique, hit one of the shapes.
         if number == 0 {
             found.push(("lobes", means(&by_paths(hidden, 3), 512)));
         }
@@ -319,34 +321,34 @@ fn a_clear_coat_weakens_what_shines_below_it() {
 }
 
 #[test]
-fn only_closed_bodies_without_a_lamp_are_dark_within() {
+fn only_closed_unlit_solids_are_dark_inside() {
     let ball = |build: Build, at: DVec3, material: Material| build.sphere(at, 0.5, material);
     let (first, second) = (v(-1.0, 0.0, -5.0), v(1.0, 0.0, -5.0));
     let two = |material: &Material| ball(ball(scene(), first, material.clone()), second, material.clone());
     let dark = |build: &Build| [0, 1].map(|body| build.world().is_unlit_glass(body));
     let rough = two(&frosted(1.5, 0.4));
     assert_eq!(dark(&rough), [true, true]);
-    assert_eq!(dark(&two(&glass(1.5))), [false, false], "smooth glass has no vertices");
+    assert_eq!(dark(&two(&glass(1.5))), [false, false], "smooth glass needs no light sampling");
     let lamp_inside = rough.clone().sphere(first, 0.1, emitter(1.0));
     assert_eq!(dark(&lamp_inside), [false, true]);
     let lamp_around = rough.clone().sphere(v(0.0, 0.0, -5.0), 8.0, emitter(1.0));
-    assert_eq!(dark(&lamp_around), [false, false], "it may be anywhere in its box");
+    assert_eq!(dark(&lamp_around), [false, false], "the light may be anywhere in its box");
     let point = rough.clone().point_light(second + v(0.2, 0.0, 0.0), 1.0, Falloff::Square);
     assert_eq!(dark(&point), [true, false]);
     let flat = rough.clone().quad(v(-4.0, -3.0, -5.8), v(8.0, 0.0, 0.0), v(0.0, 6.0, 0.0), emitter(1.0));
-    assert_eq!(dark(&flat), [true, true], "the ball around a flat lamp is larger than its box");
+    assert_eq!(dark(&flat), [true, true], "the bounding sphere of a flat light is larger than its box");
     let through = rough.clone().quad(v(-4.0, -3.0, -5.3), v(8.0, 0.0, 0.0), v(0.0, 6.0, 0.0), emitter(1.0));
     assert_eq!(dark(&through), [false, false]);
     assert_eq!(dark(&rough.environment(1.0)), [true, true]);
     let open = scene().quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), frosted(1.5, 0.4));
     assert!(!open.world().is_unlit_glass(0), "an open body");
     let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
-    assert!(!scene().shape(plane, frosted(1.5, 0.4)).world().is_unlit_glass(0), "a body without an end");
+    assert!(!scene().shape(plane, frosted(1.5, 0.4)).world().is_unlit_glass(0), "an unbounded solid");
 }
 
 #[test]
-fn without_shadows_lamps_shine_into_rough_glass() {
-    // A spark in the glass adds almost no light, but with it light samples from within count.
+fn lights_shine_into_rough_glass_unshadowed() {
+    // A spark in the glass adds almost no light, but because of it, light samples from inside count.
     let ball = scene()
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.9))
         .quad(v(-4.0, 3.0, -9.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, 8.0), emitter(8.0))
@@ -362,8 +364,9 @@ fn without_shadows_lamps_shine_into_rough_glass() {
 }
 
 #[test]
-fn a_lamp_in_rough_glass_lights_its_inside() {
-    // With a wide lamp in its middle, light samples, lobes and paths find the same through the wall.
+fn light_in_rough_glass_lights_its_inside() {
+    // With a wide light at its center, light samples, lobe samples and path tracing find the same light through the
+    // wall.
     let build = scene()
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.5))
         .sphere(v(0.0, 0.2, -5.0), 0.4, emitter(1.0))
@@ -376,8 +379,8 @@ fn a_lamp_in_rough_glass_lights_its_inside() {
 }
 
 #[test]
-fn light_through_a_sheet_on_glass_goes_on_in_the_glass() {
-    // A label on a block of black glass shows its own reflection alone, as above one of matte black.
+fn sheet_on_glass_transmits_into_the_glass() {
+    // A label on a block of black glass shows only its own reflection, as on a matte black block.
     let label = |build: Build, height: f64| {
         let material = translucent(1.0, 0.5, 1.0);
         build.quad(v(-0.4, height, 0.4), v(0.8, 0.0, 0.0), v(0.0, 0.0, -0.8), material)
@@ -408,7 +411,8 @@ fn light_through_a_sheet_on_glass_goes_on_in_the_glass() {
             "{what}: {means:?}, {exact}"
         );
     }
-    // Clear glass brings light: all techniques find the same, from above and through the block from below. It gains none.
+    // Clear glass transmits light: all techniques agree, from above and through the block from below. It gains no
+    // light.
     for from in [v(0.0, 2.4, 1.5), v(0.2, -2.4, 1.0)] {
         let clear = label(block(glass(1.5)), 0.0).environment(1.0).depth(8);
         let clear = clear.pictured(from, DVec3::ZERO, 8.0, 4, 4);
@@ -419,8 +423,8 @@ fn light_through_a_sheet_on_glass_goes_on_in_the_glass() {
 }
 
 #[test]
-fn photons_pass_rough_glass_that_does_not_refract() {
-    // A ball with the index of air, and a lamp in one of two blocks of one glass with a ball in the other.
+fn photons_pass_rough_glass_of_index_one() {
+    // A ball with the index of air, and a light in one of two blocks of the same glass with a ball in the other.
     let floor = |build: Build| build.quad(v(-2.0, 0.0, 2.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), matte(0.7));
     let lamp = |build: Build| build.sphere(v(0.4, 1.9, 0.0), 0.3, emitter(6.0));
     let air = lamp(floor(scene()).sphere(v(0.0, 0.7, 0.0), 0.5, frosted(1.0, 0.3)));
@@ -436,9 +440,9 @@ fn photons_pass_rough_glass_that_does_not_refract() {
 }
 
 #[test]
-fn a_sheet_on_glass_gains_no_light() {
-    // From inside of glass below a sheet, under a sky above it: what comes through, by basic radiance, is a part 1/n² of what it is
-    // in air, as from there light spreads over fewer directions. Nothing comes back from the depth.
+fn sheet_on_glass_gains_no_light() {
+    // From inside glass below a sheet, under a sky above it: the transmitted basic radiance is 1/n² of the transmitted
+    // radiance in air, because the light spreads over fewer directions. Nothing is reflected from below.
     let sky: Vec<Vec3> = [1.0, 1.0, 0.0, 0.0].map(Vec3::splat).to_vec();
     let sheet = |build: Build| {
         let build =

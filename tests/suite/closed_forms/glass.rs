@@ -28,7 +28,7 @@ fn lit_from_below(build: Build) -> Build {
     build.quad(v(-1e4, -2.0, 1e4), v(2e4, 0.0, 0.0), v(0.0, 0.0, -2e4), emitter(1.0))
 }
 
-/// Unpolarised reflectance at n = 1.5 by Fresnel's sine and tangent laws.
+/// Unpolarized reflectance at n = 1.5 from Fresnel's sine and tangent laws.
 fn reflectance(degrees: f64) -> f64 {
     let i = degrees.to_radians();
     let t = (i.sin() / 1.5).asin();
@@ -39,7 +39,7 @@ fn reflectance(degrees: f64) -> f64 {
 }
 
 #[test]
-fn a_slab_with_all_its_inner_reflections() {
+fn slab_sums_its_inner_reflections() {
     // T = (1 − R)²·Σ R²ⁱ = (1 − R)/(1 + R).
     for (degrees, exact) in
         [(0.0, 0.923_076_923_1), (45.0, 0.904_326_79), (60.0, 0.836_232_46), (80.0, 0.441_229_17)]
@@ -52,8 +52,8 @@ fn a_slab_with_all_its_inner_reflections() {
 }
 
 #[test]
-fn each_order_of_a_slab_has_its_power_of_the_reflectance() {
-    // Depth 2: straight through, (1 − R)²; depth 1: nothing from below; the sky above by reflection alone, R.
+fn slab_orders_are_powers_of_the_reflectance() {
+    // Depth 2: straight through, (1 − R)²; depth 1: nothing from below; the sky above only by reflection, R.
     for degrees in [0.0, 45.0, 60.0] {
         let r = reflectance(degrees);
         let through = lit_from_below(slab(degrees, glass(1.5)));
@@ -70,8 +70,9 @@ fn each_order_of_a_slab_has_its_power_of_the_reflectance() {
 }
 
 #[test]
-fn the_lateral_shift_of_a_slab() {
-    // t·sin θ·(1 − cos θ/√(n² − sin²θ)): where the edge of a light below must be to be just seen straight through.
+fn slab_shifts_rays_laterally() {
+    // t·sin θ·(1 − cos θ/√(n² − sin²θ)): the position at which the edge of a light below is just visible straight
+    // through.
     for (degrees, exact) in [(45.0, 0.329_142_31), (60.0, 0.512_472_01), (80.0, 0.833_663_85)] {
         let seen = |edge: f64| {
             let half = v(1e4, 0.0, 0.0);
@@ -88,7 +89,7 @@ fn the_lateral_shift_of_a_slab() {
     }
 }
 
-/// A ray refracted at every surface of glass of n = 1.5 until it leaves. `None` for total internal reflection.
+/// A ray refracted at every surface of glass with n = 1.5 until it leaves. `None` for total internal reflection.
 fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
     while let Some(hit) = geometry.closest(&ray) {
         let surface = geometry.surface(&ray, &hit);
@@ -102,7 +103,7 @@ fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
 }
 
 #[test]
-fn a_prism_s_least_deviation() {
+fn prism_has_its_minimum_deviation() {
     // 2·asin(n·sin 30°) − 60° = 37.180756°, at the symmetric passage.
     let mut mesh = TriangleMesh::default();
     for z in [-10.0, 10.0] {
@@ -132,8 +133,9 @@ fn a_prism_s_least_deviation() {
 }
 
 #[test]
-fn a_ball_lens_s_focus() {
-    // sin θ = h, sin θ' = h/n: the ray leaves turned by 2(θ − θ') and meets the axis at h/sin(2(θ − θ')) from the centre.
+fn ball_lens_focuses_paraxial_rays() {
+    // sin θ = h, sin θ' = h/n: the ray leaves deflected by 2(θ − θ') and meets the axis at h/sin(2(θ − θ')) from the
+    // center.
     let world = scene().sphere(DVec3::ZERO, 1.0, glass(1.5)).world();
     for (h, exact) in [(1e-3_f64, 1.5), (0.5, 1.391_572_9), (0.9, 1.104_445_6)] {
         let formula = h / (2.0 * (h.asin() - (h / 1.5).asin())).sin();
@@ -146,8 +148,8 @@ fn a_ball_lens_s_focus() {
 }
 
 #[test]
-fn lossless_glass_under_a_uniform_sky_is_invisible() {
-    // Radiance over n² is conserved, reflections and refractions share it without loss, and every path ends in the sky:
+fn lossless_glass_under_a_sky_is_invisible() {
+    // Radiance over n² is conserved, reflection and refraction split it without loss, and every path ends in the sky:
     // exactly 1, in every pixel.
     let ball = lat_long_sphere(8, 10, 1.0, v(0.0, -2.2, -6.0));
     let seen = scene()
@@ -173,8 +175,9 @@ fn lossless_glass_under_a_uniform_sky_is_invisible() {
 }
 
 #[test]
-fn a_white_furnace_seen_from_within_a_ball() {
-    // The inner reflections that chance takes weigh as much as those that it leaves: all is 1, however weak they are.
+fn white_furnace_from_inside_a_ball() {
+    // Internal reflections that roulette keeps carry the weight of those it ends: the result is 1, however weak they
+    // are.
     for ior in [1.1, 1.5, 2.4] {
         let ball = scene().sphere(DVec3::ZERO, 1.0, glass(ior)).background(1.0).depth(300);
         let seen = ball.pictured(v(0.0, 0.0, 1e-3), v(0.0, 0.0, -1.0), 2.0, 8, 8).picture(1024, 1);
@@ -210,16 +213,16 @@ fn absorption_along_a_slab_and_a_ball() {
     let r = reflectance(h.asin().to_degrees());
     let chord = 2.0 * (1.0 - (h / 1.5).powi(2)).sqrt();
     for channel in 0..3 {
-        // The sky is seen by the reflection, straight through, and by nothing else at depth 2.
+        // The sky is visible by reflection, straight through, and in no other way at depth 2.
         let exact = r + (1.0 - r).powi(2) * tint[channel].powf(chord);
         assert_close("chord", ball.color()[channel], exact);
     }
 }
 
 #[test]
-fn a_glass_of_its_surroundings_index_is_invisible() {
-    // Without a change of n there is no reflection and no refraction: the pictures with and without the ball are the
-    // same, up to its rim.
+fn glass_of_the_surrounding_index_is_invisible() {
+    // Without a change of n there is no reflection and no refraction: the images with and without the ball are equal up
+    // to its rim.
     let behind = |build: Build| {
         (0..10).fold(build.background(0.1), |build, i| {
             let x = f64::from(i) * 0.4 - 2.0;
@@ -230,7 +233,7 @@ fn a_glass_of_its_surroundings_index_is_invisible() {
     let ball = behind(scene().sphere(v(0.0, 0.0, -5.0), 1.0, glass(1.0)));
     let mut random = super::Random(5);
     for i in 0..3000 {
-        // Rays at the rim, at distances 1 − 10⁻¹ … 1 − 10⁻⁷ from the middle of the ball as the eye sees it.
+        // Rays near the rim, at distances 1 − 10⁻¹ … 1 − 10⁻⁷ from the center of the ball as seen from the camera.
         let rim = 1.0 / (1.0 - 1.0 / 25.0_f64).sqrt();
         let r = rim * (1.0 - 10.0_f64.powf(-1.0 - 6.0 * random.unit()));
         let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
@@ -242,7 +245,7 @@ fn a_glass_of_its_surroundings_index_is_invisible() {
 
 #[test]
 fn nested_glass() {
-    // In a slab of n = 1.5 a ball of the same n changes nothing: at depth 4 the path through both is (1 − R)².
+    // In a slab of n = 1.5, a ball of the same n changes nothing: at depth 4 the path through both is (1 − R)².
     let r = reflectance(30.0);
     let inside = slab(30.0, glass(1.5)).sphere(v(0.2, -0.5, 0.05), 0.3, glass(1.5));
     assert_close("equal", lit_from_below(inside).depth(4).value(), (1.0 - r).powi(2));
@@ -253,12 +256,12 @@ fn nested_glass() {
     let dense = slab(0.0, glass(1.5)).sphere(v(0.0, -0.5, 0.0), 0.25, glass(2.0));
     let inner = 1.0 - 1.0 / 49.0;
     assert_mean("dense", &lit_from_below(dense).depth(4).values(64, 64), (0.96 * inner) * (0.96 * inner));
-    // From within the slab one surface is left; radiance is basic, L/n².
+    // From inside the slab one surface remains; radiance is basic, L/n².
     let within = slab(0.0, glass(1.5)).seen(v(0.0, -0.5, 0.0), v(0.0, -1.0, 0.0));
     assert_close("from within", lit_from_below(within).depth(1).value(), 0.96);
 }
 
-/// Cubes as (centre, edge, material) in one mesh, faces outwards.
+/// Cubes given as (center, edge, material) in one mesh, faces outwards.
 pub fn boxes(parts: &[(DVec3, f64, u32)]) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for &(center, edge, material) in parts {
@@ -279,8 +282,8 @@ pub fn boxes(parts: &[(DVec3, f64, u32)]) -> TriangleMesh {
 }
 
 #[test]
-fn every_part_of_a_mesh_is_of_its_own_glass() {
-    // Straight through a slab, T = (1 − R)² with R = ((n − 1)/(n + 1))²; the first triangles are of something else.
+fn mesh_parts_have_their_own_glass() {
+    // Straight through a slab, T = (1 − R)² with R = ((n − 1)/(n + 1))²; the first triangles have another material.
     let passed = |n: f64| (1.0 - ((n - 1.0) / (n + 1.0)).powi(2)).powi(2);
     let look = |build: &Build, x: f64| {
         let through = build.clone().seen(v(x, 3.0, 0.1), v(x, 0.0, 0.1));
@@ -300,7 +303,7 @@ fn every_part_of_a_mesh_is_of_its_own_glass() {
 }
 
 #[test]
-fn parts_of_a_mesh_may_be_nested() {
+fn mesh_parts_can_be_nested() {
     // Four surfaces along the axis: air to 1.5 and back .04 each, 1.5 to 2 and back 1/49 each, in one object.
     let mesh = boxes(&[(v(0.0, 0.0, 0.0), 1.0, 0), (v(0.0, 0.0, 0.0), 0.5, 1)]);
     let nested = scene().own_mesh(mesh, vec![file_material(9, 1.5), file_material(9, 2.0)]);
@@ -310,9 +313,9 @@ fn parts_of_a_mesh_may_be_nested() {
 }
 
 #[test]
-fn bent_normals_make_no_light() {
-    // Reflection and refraction share a ray's radiance over n², the choice of one of them by chance keeps it whole, and each
-    // part that leaves sees the sky once: at most 1, in glass too. Rays that the smooth normal refracts along
+fn shading_normals_create_no_light() {
+    // Reflection and refraction split a ray's radiance over n², choosing one of them at random preserves it, and each
+    // part that leaves sees the sky once: at most 1, inside glass as well. Rays that the shading normal refracts along
     // the outside, but not through the facet, must not count as having left.
     let mut ball = lat_long_sphere(8, 10, 1.0, DVec3::ZERO);
     ball.normals = ball.positions.iter().map(|p| p.normalize()).collect();

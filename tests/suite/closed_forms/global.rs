@@ -11,29 +11,30 @@ use super::distant::sun;
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tinted};
 use super::{assert_close, assert_mean, lambert, mean_and_error, v};
 
-/// A scene that is rendered by paths.
+/// A path-traced scene.
 pub fn by_paths(build: Build, max_depth: u32) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path).depth(max_depth)
 }
 
-/// Checks |mean − exact| ≤ 4 standard errors over seeds. These are at most this fraction of the exact value, so that noise
-/// alone does not pass.
+/// Checks |mean − exact| ≤ 4 standard errors over seeds. The standard error is at most this fraction of the exact
+/// value, so that noise alone does not pass.
 #[track_caller]
 pub fn assert_near(what: &str, values: &[f64], exact: f64, most_error: f64) {
     assert!(values.len() >= 16, "too few seeds");
     let (mean, error) = mean_and_error(values);
-    assert!(error <= most_error * exact, "{what}: {mean} ± {error} says nothing about {exact}");
+    assert!(error <= most_error * exact, "{what}: {mean} ± {error} is too noisy for {exact}");
     let allowed = (4.0 * error).max(2e-5 * exact);
     assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
 }
 
-/// A closed room whose walls are all of one material. A sphere seen from inside shows its back, a box of quads its front.
+/// A closed room whose walls are all of one material. The camera sees the back of a sphere, or the fronts of a box of
+/// quads.
 fn room(emission: f32, reflectance: f32, specular: f32) -> Build {
     let wall = || phong(reflectance, specular, 20.0, emission);
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
     let (o, far) = (v(low, low, low), v(low + side, low + side, low + side));
-    // Fronts along u × v, inwards.
+    // Fronts are along u × v, inwards.
     scene()
         .quad(o, x, y, wall())
         .quad(o, y, z, wall())
@@ -45,8 +46,8 @@ fn room(emission: f32, reflectance: f32, specular: f32) -> Build {
 }
 
 #[test]
-fn a_furnace_sums_its_bounces_to_the_depth_asked_for() {
-    // L = E·(1 + ρ + … + ρᵏ); every vertex of every path is in the same light.
+fn furnace_sums_its_bounces_up_to_the_depth() {
+    // L = E·(1 + ρ + … + ρᵏ); every vertex of every path receives the same light.
     for (reflectance, seeds) in [(0.5_f64, 16), (0.8, 32)] {
         for depth in [0, 1, 2, 3, 8, 60] {
             let values = by_paths(room(1.0, reflectance as f32, 0.0), depth).values(512, seeds);
@@ -57,22 +58,22 @@ fn a_furnace_sums_its_bounces_to_the_depth_asked_for() {
 }
 
 #[test]
-fn an_integrating_sphere_is_lit_everywhere_alike_by_what_bounces() {
+fn integrating_sphere_has_uniform_indirect_light() {
     // R = 1, I = 1 W/sr at x = .5, ρ = .5: indirect irradiance 1; L = ρ/π·(1 + I·cos/d²).
     let sphere = |to: DVec3| {
         let walls = scene().sphere(DVec3::ZERO, 1.0, matte(0.5)).seen(v(0.0, 0.1, 0.0), to);
         by_paths(walls.point_light(v(0.5, 0.0, 0.0), 1.0, Falloff::Square), 60)
     };
     for (to, exact) in [(v(1.0, 0.0, 0.0), 0.795_774_715_5), (v(-1.0, 0.0, 0.0), 0.229_890_473_4)] {
-        // 4 at the near wall, 4/9 at the far one, for the direct part.
+        // 4 at the near wall, 4/9 at the far one, for the direct component.
         assert_near("integrating sphere", &sphere(to).values(1024, 32), exact, 3e-3);
     }
 }
 
 #[test]
-fn concentric_spheres_exchange_their_light() {
-    // Inner: R = 1, E = 1, ρ = .5; outer: R = 2, ρ = .8. All that the inner one sends out meets the outer one, of what that
-    // sends a quarter comes back: L₁ = 4/3, L₂ = 2/3, and .2 by direct light alone.
+fn concentric_spheres_exchange_light() {
+    // Inner: R = 1, E = 1, ρ = .5; outer: R = 2, ρ = .8. All light that leaves the inner sphere reaches the outer one,
+    // and a quarter of what the outer one emits returns: L₁ = 4/3, L₂ = 2/3, and .2 with direct light only.
     let spheres =
         || scene().sphere(DVec3::ZERO, 1.0, phong(0.5, 0.0, 1.0, 1.0)).sphere(DVec3::ZERO, 2.0, matte(0.8));
     let inner = by_paths(spheres().seen(v(1.5, 0.2, 0.0), DVec3::ZERO), 80);
@@ -83,9 +84,9 @@ fn concentric_spheres_exchange_their_light() {
 }
 
 #[test]
-fn a_glowing_ball_in_a_mirror_sees_itself() {
-    // A ball of E = 1, ρ = .8 is inside of a sphere that reflects .6: all light that leaves the ball comes back to it,
-    // after two scatterings. L = Σ .48ᵏ, 2k ≤ depth. Russian roulette follows both kinds of scatterings.
+fn glowing_ball_in_a_mirror_sees_itself() {
+    // A ball of E = 1, ρ = .8 is inside a sphere that reflects .6: all light that leaves the ball returns to it after
+    // two bounces. L = Σ .48ᵏ, 2k ≤ depth. Russian roulette applies to both kinds of bounces.
     let ball = scene().sphere(DVec3::ZERO, 1.0, phong(0.8, 0.0, 1.0, 1.0));
     let inside = ball.sphere(DVec3::ZERO, 2.0, mirror(0.6)).seen(v(1.5, 0.2, 0.0), DVec3::ZERO);
     for (depth, turns) in [(2, 1), (5, 2), (9, 4), (40, 20)] {
@@ -96,7 +97,7 @@ fn a_glowing_ball_in_a_mirror_sees_itself() {
 }
 
 #[test]
-fn two_plates_exchange_their_light() {
+fn two_plates_exchange_light() {
     // Infinite: L₁ = (E + ρ₁·…): 5/3 and 4/3 for E₁ = 1, ρ = .5 and .8. As quads 1e4 times as wide as their distance.
     let half = 5e3;
     let plates = |at: f64| {
@@ -111,7 +112,7 @@ fn two_plates_exchange_their_light() {
             .seen(v(0.0, 0.5, 0.0), v(0.1, at, 0.1))
     };
     for (at, exact) in [(0.0, 5.0 / 3.0), (1.0, 4.0 / 3.0)] {
-        // Four standard errors are a thousandth at most.
+        // Four standard errors are at most a thousandth.
         let values = by_paths(plates(at), 100).values(16384, 96);
         assert_near("plates", &values, exact, 2.5e-4);
         assert!((mean_and_error(&values).0 - exact).abs() <= 1e-3 * exact);
@@ -119,8 +120,8 @@ fn two_plates_exchange_their_light() {
 }
 
 #[test]
-fn nothing_is_lost_or_won_at_lossless_mirrors_and_glass() {
-    // A white background is behind everything: 1, whatever the path. Roulette never ends a path without loss.
+fn lossless_mirrors_and_glass_conserve_light() {
+    // A white background surrounds everything: 1 on every path. Roulette never ends a lossless path.
     for (what, material) in [("mirror", mirror(1.0)), ("glass", glass(1.5)), ("diamond", glass(2.4))] {
         let ball =
             scene().sphere(DVec3::ZERO, 1.0, material).pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 30.0, 16, 16);
@@ -132,7 +133,7 @@ fn nothing_is_lost_or_won_at_lossless_mirrors_and_glass() {
 }
 
 #[test]
-fn the_background_lights_nothing_but_is_seen_by_mirrors() {
+fn background_is_visible_only_in_mirrors() {
     let floor = || scene().quad(v(-5.0, 0.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -10.0), matte(0.9));
     let lit = by_paths(floor().background(1.0).seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
     assert_eq!(lit.values(64, 1), [0.0]);
@@ -141,11 +142,11 @@ fn the_background_lights_nothing_but_is_seen_by_mirrors() {
     let one = seen.values(4, 1)[0];
     assert!(one == 0.5 || one == 1.0, "{one}");
     let indirect = by_paths(seen.seen(v(0.0, 1.0, 0.0), DVec3::ZERO), 8);
-    assert_eq!(indirect.values(64, 1), [0.0], "nor by way of a mirror");
+    assert_eq!(indirect.values(64, 1), [0.0], "nor through a mirror");
 }
 
 #[test]
-fn emission_through_glass_arrives_by_paths() {
+fn paths_find_emission_through_glass() {
     let inside = |with_glass: bool| {
         let mut build = room(1.0, 0.5, 0.0);
         if with_glass {
@@ -159,7 +160,7 @@ fn emission_through_glass_arrives_by_paths() {
 }
 
 #[test]
-fn the_parts_of_a_picture_by_paths_add_up_to_it() {
+fn path_components_add_up() {
     let build = |view| {
         let lamp = emitter(4.0);
         let room = room(0.0, 0.4, 0.4)
@@ -172,7 +173,7 @@ fn the_parts_of_a_picture_by_paths_add_up_to_it() {
     };
     let beauty = build(View::Beauty);
     let parts = [View::Ambient, View::Diffuse, View::Specular, View::Emission].map(build);
-    assert!(parts[0].iter().all(|pixel| *pixel == DVec3::ZERO), "paths have no ambient light");
+    assert!(parts[0].iter().all(|pixel| *pixel == DVec3::ZERO), "path has no ambient light");
     for (i, whole) in beauty.iter().enumerate() {
         let sum: DVec3 = parts.iter().map(|part| part[i]).sum();
         assert!(
@@ -182,16 +183,16 @@ fn the_parts_of_a_picture_by_paths_add_up_to_it() {
     }
     assert!(
         parts[1..].iter().all(|part| part.iter().any(|pixel| pixel.x > 0.01)),
-        "every part shows something"
+        "every component has light"
     );
 }
 
-/// Every kind of lamp, wide and near above a floor of a material.
+/// Every kind of light, wide and near above a floor of a material.
 pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
     let floor = || {
         let corner = v(-0.05, 0.0, 0.05);
         let floor = scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), material.clone());
-        // From −45°: the mirrored direction goes through (1, 1, 0).
+        // From −45°: the mirrored direction passes through (1, 1, 0).
         floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
     };
     let at = v(0.8, 0.9, 0.1);
@@ -225,7 +226,7 @@ pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
         ("sun", sun(floor(), -at, 2.0, 40.0)),
         ("narrow sun", sun(floor(), v(-1.0, -1.05, 0.0), 2.0, 3.0)),
         (
-            "sharp sun beside a sphere",
+            "sharp sun next to a sphere",
             sun(floor().sphere(at, 0.4, emitter(2.0)), v(1.0, -2.0, 0.0), 0.5, 0.0),
         ),
         ("half a sun", sun(floor().sphere(at * 3.0, 1.0, matte(0.0)), -at, 2.0, 60.0)),
@@ -233,15 +234,15 @@ pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
 }
 
 #[test]
-fn direct_light_by_paths_is_that_of_whitted() {
-    // Both ways to find a lamp: the narrower the lobe, the more is found by its own samples.
+fn direct_light_of_path_matches_whitted() {
+    // Two ways to find a light: the narrower the lobe, the more of it lobe samples find.
     for (diffuse, specular, shininess) in [(0.7, 0.0, 1.0), (0.3, 0.6, 10.0), (0.1, 0.8, 90.0)] {
         for (what, build) in lamps_over_a_floor(&phong(diffuse, specular, shininess, 0.0)) {
             let path = by_paths(build.clone(), 1).values(512, 16);
             let whitted = build.depth(1).values(2048, 16);
             let ((a, of_a), (b, of_b)) = (mean_and_error(&path), mean_and_error(&whitted));
             let error = of_a.hypot(of_b);
-            assert!(error < 0.01 * b, "{what}, α {shininess}: ± {error} of {b} says nothing");
+            assert!(error < 0.01 * b, "{what}, α {shininess}: ± {error} of {b} is too noisy");
             assert!(
                 (a - b).abs() < 5.0 * error + 1e-5 * b,
                 "{what}, α {shininess}: {a} ± {of_a}, {b} ± {of_b}"
@@ -251,9 +252,9 @@ fn direct_light_by_paths_is_that_of_whitted() {
 }
 
 #[test]
-fn a_sharp_highlight_of_a_lamp_has_little_noise() {
-    // The lamp covers all of the lobe: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; and the diffuse
-    // part.
+fn sharp_highlight_has_low_variance() {
+    // The light covers the whole lobe: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; plus the
+    // diffuse component.
     let corners = [v(0.2, 1.8, -0.9), v(1.8, 0.2, -0.9), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
     let (u, w) = (corners[1] - corners[0], corners[3] - corners[0]);
     for shininess in [1e3_f32, 1e5] {
@@ -263,7 +264,7 @@ fn a_sharp_highlight_of_a_lamp_has_little_noise() {
         let lit = floor.quad(corners[0], u, w, emitter(3.0)).seen(v(-0.1, 0.1, 0.0), DVec3::ZERO);
         let diffuse = 0.2 / std::f64::consts::PI * lambert(DVec3::ZERO, DVec3::Y, &corners);
         let exact = 3.0 * (diffuse + 0.5 * 0.5_f64.sqrt());
-        // A disc in the sky of the same radiance, whose irradiance at normal incidence is π·sin² of half its angle.
+        // A disk in the sky with the same radiance; its irradiance at normal incidence is π·sin² of half its angle.
         let disc = std::f64::consts::PI * 20_f64.to_radians().sin().powi(2);
         let floor =
             scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.2, 0.5, shininess, 0.0));
@@ -282,7 +283,7 @@ fn a_sharp_highlight_of_a_lamp_has_little_noise() {
             let mean = mean_and_error(&build.values(256, 64)).0;
             assert!((mean / exact - 1.0).abs() < 3e-3, "{what}, α {shininess}: {mean} is not {exact}");
         }
-        // At the edge of the lamp half of the lobe misses it.
+        // At the edge of the light, half of the lobe misses it.
         let cut = lit.with(|scene| {
             if let Some(Shape::Quad { v: side, corner, .. }) =
                 scene.objects.last_mut().map(|object| &mut object.shape)
@@ -299,7 +300,7 @@ fn a_sharp_highlight_of_a_lamp_has_little_noise() {
 }
 
 #[test]
-fn only_sharp_highlights_of_lamps_that_rays_can_meet_cost_rays() {
+fn only_reachable_sharp_highlights_cost_rays() {
     let scattered = |shininess: f32, lamp: bool, max_depth: u32| {
         let floor = scene().quad(
             v(-1.0, 0.0, 1.0),
@@ -323,8 +324,8 @@ fn only_sharp_highlights_of_lamps_that_rays_can_meet_cost_rays() {
 }
 
 #[test]
-fn mirrors_and_glass_are_followed_as_by_whitted() {
-    // Emission by δ lobes alone: whitted splits its rays, a path chooses; both count each surface as a scattering.
+fn path_follows_mirrors_and_glass_like_whitted() {
+    // Emission through δ lobes only: whitted splits its rays, a path chooses one; both count each surface as a bounce.
     let build = || {
         scene()
             .quad(v(-9.0, -9.0, -9.0), v(18.0, 0.0, 0.0), v(0.0, 18.0, 0.0), emitter(1.0))
@@ -352,10 +353,10 @@ fn mirrors_and_glass_are_followed_as_by_whitted() {
 }
 
 #[test]
-fn light_behind_glass_is_found_by_paths_alone_and_counted_once() {
-    // One lamp lies on a pane and one in the open. The pane's lamp reaches the floor through its glass, which is opaque to
-    // light samples. A slab passes (1 − R)/(1 + R), and over all angles a numeric integral gives the floor's light. Here the
-    // check is by equality: glass of index 1 changes nothing.
+fn only_paths_find_light_behind_glass() {
+    // One light is covered by a pane, one is in the open. The covered light reaches the floor through glass that is
+    // opaque to light samples. A slab transmits (1 − R)/(1 + R), and integrating numerically over all angles would give
+    // the floor's light. This test checks equality instead: glass of index 1 changes nothing.
     let lit = |ior: Option<f32>| {
         let floor =
             scene().quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.4, 0.4, 8.0, 0.0));
@@ -375,7 +376,7 @@ fn light_behind_glass_is_found_by_paths_alone_and_counted_once() {
 }
 
 #[test]
-fn a_clamp_is_a_bias_downwards_and_off_by_default() {
+fn clamp_darkens_and_is_off_by_default() {
     let dark = |clamp: f32| {
         let lamp = emitter(200.0);
         let room = room(0.0, 0.7, 0.0).quad(v(-0.05, 0.9, -0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, 0.1), lamp);
@@ -388,8 +389,8 @@ fn a_clamp_is_a_bias_downwards_and_off_by_default() {
 }
 
 #[test]
-fn coloured_walls_multiply_their_colours() {
-    // A furnace of another reflectance for each colour: L = E/(1 − ρ).
+fn colored_walls_multiply_their_colors() {
+    // A furnace with a different reflectance for each color: L = E/(1 − ρ).
     let colors = Vec3::new(0.2, 0.5, 0.75);
     let room = room(1.0, 0.5, 0.0).with(|scene| {
         for material in &mut scene.materials {
@@ -407,8 +408,8 @@ fn coloured_walls_multiply_their_colours() {
 }
 
 #[test]
-fn light_inside_glass_is_tinted_on_its_way_from_the_lamp_as_well() {
-    // Floor, lamp and eye are in one glass: tint^(lamp to floor) · tint^(floor to eye).
+fn light_samples_inside_glass_are_tinted() {
+    // Floor, light and camera are in the same glass: tint^(light to floor) · tint^(floor to camera).
     let tint = 0.5_f64;
     let inside = || {
         let glass = tinted(1.5, DVec3::splat(tint));
@@ -425,7 +426,7 @@ fn light_inside_glass_is_tinted_on_its_way_from_the_lamp_as_well() {
             assert_close(what, build.clone().shadows(shadows, 1).value(), exact);
         }
     }
-    // A lamp of 6 × 6 at a height of 1.6, by a sum over its midpoints.
+    // A light of 6 × 6 at a height of 1.6, summed over its midpoints.
     let (side, height, steps) = (6.0, 1.6, 600);
     let mut sum = 0.0;
     for i in 0..steps {
@@ -441,7 +442,7 @@ fn light_inside_glass_is_tinted_on_its_way_from_the_lamp_as_well() {
     for (what, build) in [("whitted", lit.clone()), ("path", by_paths(lit, 1))] {
         assert_mean(what, &build.values(256, 64), exact);
     }
-    // The same by the lobe of a sharp highlight.
+    // The same through the lobe of a sharp highlight.
     let glossy = |build: Build| build.with(|scene| scene.materials[0] = phong(0.1, 0.8, 1e4, 0.0));
     let lit = inside().quad(v(-3.0, height, -3.0), v(side, 0.0, 0.0), v(0.0, 0.0, side), emitter(1.0));
     let lit = glossy(lit.seen(v(0.5, 0.5, 0.0), DVec3::ZERO));

@@ -1,4 +1,5 @@
-//! Hard shadows: one ray to the middle decides; unoccluded light is as without shadows and with soft ones.
+//! Hard shadows: one ray to the light's center decides; unoccluded light is the same as without shadows and with soft
+//! ones.
 
 use glimt::integrators::render_tile;
 use glimt::math::DVec3;
@@ -9,7 +10,7 @@ use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
 use super::{mean_and_error, v};
 
-/// Every kind of light above a receiver, at a height and of a size.
+/// Every kind of light above a receiver, at a given height and size.
 fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
     let at = v(0.0, height, 0.0);
     let lit = |shape: Shape| receiver(DVec3::ZERO, 0.8).shape(shape, emitter(3.0));
@@ -34,8 +35,8 @@ fn lights(height: f64, size: f64) -> Vec<(&'static str, Build)> {
 }
 
 #[test]
-fn unoccluded_light_is_the_same_with_any_shadows() {
-    // Also at a tenth of the lamp's size from it.
+fn unoccluded_light_ignores_the_shadow_mode() {
+    // Also at a tenth of the light's size from it.
     for (height, size) in [(2.0, 0.5), (1.2, 1.0), (10.0, 0.3)] {
         for (name, build) in lights(height, size) {
             let values = |shadows: Shadows| build.clone().shadows(shadows, 4).values(256, 16);
@@ -53,8 +54,8 @@ fn unoccluded_light_is_the_same_with_any_shadows() {
 }
 
 #[test]
-fn lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle() {
-    // A lamp and its mirror image in a metal floor; a small ball before the lamp's middle, and one that stands elsewhere.
+fn metal_lobes_use_the_same_shadow_ray() {
+    // A light and its mirror image in a metal floor; a small ball in front of the light's center, and one elsewhere.
     let floor = |roughness: f32| {
         scene()
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), metal(0.9, roughness, 0.0))
@@ -70,7 +71,7 @@ fn lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle() {
             let build = lit(floor(roughness)).sphere(at, 0.02, matte(0.0)).shadows(shadows, 1);
             mean_and_error(&build.values(1024, 16))
         };
-        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "the middle is hidden");
+        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "the center is hidden");
         let beside = corner + v(0.0, 1.5, 1.9);
         for (name, (mean, error)) in [
             ("another place is hidden", with(beside * 0.5, Shadows::Hard)),
@@ -84,8 +85,8 @@ fn lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle() {
 }
 
 #[test]
-fn close_to_a_lamp_hard_shadows_leave_its_light() {
-    // A square of side 1 a tenth above: E/L = 3.042128 by the closed form of a parallel rectangle.
+fn hard_shadows_keep_the_light_of_a_close_light() {
+    // A square of side 1, a tenth above: E/L = 3.042128 from the closed form of a parallel rectangle.
     let corner = v(-0.5, 0.1, -0.5);
     let lamp = receiver(DVec3::ZERO, 0.8).quad(corner, v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(1.0));
     let values = lamp.shadows(Shadows::Hard, 16).values(256, 16);
@@ -95,7 +96,7 @@ fn close_to_a_lamp_hard_shadows_leave_its_light() {
 }
 
 #[test]
-fn the_ray_to_the_middle_decides() {
+fn ray_to_the_center_decides() {
     let lamp = |build: Build| {
         build
             .quad(v(-1.0, 2.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(1.0))
@@ -107,13 +108,13 @@ fn the_ray_to_the_middle_decides() {
         lamp(receiver(DVec3::ZERO, 0.8).quad(screen, v(0.4, 0.0, 0.0), v(0.0, 0.0, 0.4), matte(0.0))).value()
     };
     assert!(free > 0.0);
-    // Over the middle, and beside it, where soft shadows would have a part of it.
+    // In front of the center, and next to it, where soft shadows would be partial.
     assert_eq!(blocked(-0.2), 0.0);
     assert_eq!(blocked(0.05), free);
     assert_eq!(scene().value(), 0.0);
 }
 
-/// Shadow rays of one sample.
+/// Shadow rays per sample.
 fn rays(build: &Build) -> u64 {
     let whole = glimt::film::Rect { x: 0, y: 0, width: 1, height: 1 };
     let token = glimt::control::CancelToken::new();
@@ -124,8 +125,8 @@ fn rays(build: &Build) -> u64 {
 }
 
 #[test]
-fn one_ray_to_the_middle_decides_for_a_box_and_for_a_mesh() {
-    // Three faces of the cube are seen from the receiver beside it.
+fn one_ray_decides_for_a_box_and_a_mesh() {
+    // Three faces of the cube are visible from the receiver next to it.
     let center = v(0.5, 1.5, 0.4);
     let cube = |build: Build| {
         build.shape(Shape::Box { center, size: v(0.8, 0.8, 0.8), rotate: DVec3::ZERO }, emitter(1.0))
@@ -146,7 +147,7 @@ fn one_ray_to_the_middle_decides_for_a_box_and_for_a_mesh() {
         };
         let all = value(free);
         assert!(all > 0.0, "{name}");
-        // On the way to the middle, and on that to the middle of the lower face.
+        // On the way to the center, and on the way to the center of the lower face.
         assert_eq!(value(hard(screen(center * 0.5))), 0.0, "{name}");
         let beside = value(hard(screen((center - v(0.0, 0.4, 0.0)) * 0.5)));
         assert_eq!(beside, all, "{name}");

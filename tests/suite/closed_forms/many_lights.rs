@@ -1,4 +1,4 @@
-//! Many lights: the samples of the picked ones add up to the light of all.
+//! Many lights: sampling a few of them gives the light of all.
 
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
@@ -12,7 +12,7 @@ use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
 use super::{Random, mean_and_error, v};
 
-/// Adds nearly dark lights, so many that vertices pick from all; black ones would be left out.
+/// Adds nearly dark lights, enough that vertices sample from all lights; black ones would be removed.
 fn with_dark_lights(build: Build) -> Build {
     (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 1e-20, Falloff::Square))
 }
@@ -33,11 +33,11 @@ fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), m
     };
     let ((a, of_a), (b, of_b)) = (mean_and_error(&means(a)), mean_and_error(&means(b)));
     let error = of_a.hypot(of_b);
-    assert!(error < most_error * b, "{what}: ± {error} of {b} says nothing");
+    assert!(error < most_error * b, "{what}: ± {error} of {b} is too noisy");
     assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a} is not {b} ± {of_b}");
 }
 
-/// A floor with objects on it, seen by a few pixels from below the lamps, whose edges would be most of the noise.
+/// A floor with objects, seen by a few pixels from below the lights, whose edges would add most of the noise.
 fn room(floor: glimt::scene::description::Material) -> Build {
     scene()
         .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
@@ -46,7 +46,7 @@ fn room(floor: glimt::scene::description::Material) -> Build {
         .pictured(v(0.0, 1.3, 3.2), DVec3::ZERO, 30.0, 12, 12)
 }
 
-/// One light of each kind and more, at most 32.
+/// At least one light of each kind, at most 32.
 fn every_kind(build: Build) -> Build {
     let at = v(1.5, 1.5, 1.0);
     let shaped = build
@@ -82,7 +82,7 @@ fn every_kind(build: Build) -> Build {
 }
 
 #[test]
-fn picks_among_lights_of_every_kind_bring_what_all_of_them_do() {
+fn sampled_lights_of_every_kind_match_their_sum() {
     let build = every_kind(room(phong(0.4, 0.3, 200.0, 0.0)));
     let picked = with_dark_lights(build.clone());
     assert!(
@@ -105,7 +105,7 @@ fn picks_among_lights_of_every_kind_bring_what_all_of_them_do() {
 }
 
 #[test]
-fn picks_inside_glass_and_behind_mirrors_bring_what_all_lights_do() {
+fn sampled_lights_in_glass_match_their_sum() {
     let build = every_kind(room(matte(0.5)).sphere(v(0.0, 0.5, 1.6), 0.5, glass(1.5))).quad(
         v(-2.0, 0.0, -2.5),
         v(4.0, 0.0, 0.0),
@@ -117,8 +117,8 @@ fn picks_inside_glass_and_behind_mirrors_bring_what_all_lights_do() {
     assert_same("path", &by_paths(picked, 4), &by_paths(build, 4), (32, 24), 1.5e-2);
 }
 
-/// A lamp of two by two over the floor, cut into so many by so many quads.
-fn cut_lamp(build: Build, parts: u32) -> Build {
+/// A 2 × 2 area light over the floor, divided into `parts` × `parts` quads.
+fn divided_light(build: Build, parts: u32) -> Build {
     let side = 2.0 / f64::from(parts);
     (0..parts * parts).fold(build, |build, i| {
         let corner = v(-1.0 + side * f64::from(i % parts), 2.0, -1.0 + side * f64::from(i / parts));
@@ -127,27 +127,27 @@ fn cut_lamp(build: Build, parts: u32) -> Build {
 }
 
 #[test]
-fn a_lamp_that_is_cut_into_a_thousand_lights_as_before() {
+fn divided_light_gives_the_same_light() {
     for (what, floor, noise) in [("matte", matte(0.7), 1.0), ("sharp", phong(0.2, 0.6, 300.0, 0.0), 2.5)] {
-        let [whole, cut] = [1, 32].map(|parts| cut_lamp(room(floor.clone()), parts));
+        let [whole, cut] = [1, 32].map(|parts| divided_light(room(floor.clone()), parts));
         assert_same(&format!("whitted, {what}"), &cut, &whole, (64, 16), 3e-3 * noise);
         assert_same(&format!("path, {what}"), &by_paths(cut, 3), &by_paths(whole, 3), (64, 24), 6e-3 * noise);
     }
 }
 
-/// The lobes find most of the light; each of the thousand lamps is picked once in thirty vertices.
+/// The lobes find most of the light; vertices sample each of the thousand lights about once in thirty times.
 #[test]
-fn a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before() {
+fn divided_light_keeps_its_sharp_highlight() {
     let floor = phong(0.0, 0.8, 300.0, 0.0);
     let seen = scene()
         .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
         .seen(v(0.0, 1.5, 1.0), v(0.0, 0.0, 0.4));
-    let [whole, cut] = [1, 32].map(|parts| cut_lamp(seen.clone(), parts));
+    let [whole, cut] = [1, 32].map(|parts| divided_light(seen.clone(), parts));
     assert_same("whitted", &cut, &whole, (64, 16), 6e-3);
     assert_same("path", &by_paths(cut, 1), &by_paths(whole, 1), (64, 16), 6e-3);
 }
 
-/// Triangles of sizes from 1 to 100 over the floor, most of them with their fronts down, some sideways.
+/// Triangles of sizes from 1 to 100 over the floor, most of them facing down, some sideways.
 fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
     let mut random = Random(4);
     let triangle = |i: u32| {
@@ -161,7 +161,7 @@ fn uneven_triangles(count: u32) -> Vec<[DVec3; 3]> {
 }
 
 #[test]
-fn a_mesh_of_thousands_of_uneven_lamps_lights_as_each_of_them_alone() {
+fn mesh_light_equals_its_separate_triangles() {
     let triangles = uneven_triangles(3000);
     let rounded = |corner: DVec3| corner.as_vec3().as_dvec3();
     let alone = triangles
@@ -179,8 +179,8 @@ fn a_mesh_of_thousands_of_uneven_lamps_lights_as_each_of_them_alone() {
 }
 
 #[test]
-fn a_hundred_points_over_a_floor_light_it_as_their_sum() {
-    // E = Σ I·cos/d², radiance ρ·E/π: picks are all that is random.
+fn hundred_point_lights_give_their_sum() {
+    // E = Σ I·cos/d², radiance ρ·E/π: only the choice of lights is random.
     let mut random = Random(9);
     let places: Vec<DVec3> =
         (0..100).map(|_| v(random.signed() * 2.0, 1.0 + random.unit(), random.signed() * 2.0)).collect();
@@ -194,7 +194,8 @@ fn a_hundred_points_over_a_floor_light_it_as_their_sum() {
         let (mean, error) = mean_and_error(&values);
         assert!(error < 2e-3 * exact, "{what}: {error} of {exact}");
         assert!((mean - exact).abs() < 4.5 * error + 1e-5 * exact, "{what}: {mean} ± {error} is not {exact}");
-        // Points for which the tree examines every light pick in proportion to what arrives: hardly anything is random.
+        // For points at which the tree examines every light, the selection is proportional to the irradiance: hardly
+        // any noise remains.
         assert!(error * 8.0 < 1e-3 * exact, "{what}: {}", error * 8.0 / exact);
     }
 }

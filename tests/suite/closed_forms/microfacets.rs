@@ -1,4 +1,4 @@
-//! Metal, plastic and principled materials in every integrator.
+//! Metal, plastic and principled materials with every integrator.
 
 use glimt::choice::Choice;
 use glimt::integrators::View;
@@ -14,7 +14,7 @@ use super::scenes::{
 };
 use super::{assert_close, mean_and_error, v};
 
-/// Materials of lobes of every width.
+/// Materials with lobes of every width.
 fn materials() -> Vec<(&'static str, Material)> {
     vec![
         ("narrow metal", metal(0.8, 0.1, 0.0)),
@@ -30,7 +30,7 @@ fn materials() -> Vec<(&'static str, Material)> {
     ]
 }
 
-/// A ball of a material alone under an even sky of radiance 1, seen at its edge.
+/// A single ball of a material in a furnace of radiance 1, seen at its edge.
 fn in_the_open(material: Material, depth: u32) -> Build {
     scene()
         .environment(1.0)
@@ -46,7 +46,7 @@ fn white_plastic_vanishes_in_a_furnace() {
             let build = in_the_open(plastic(1.0, roughness), 1).seen(DVec3::ZERO, at);
             for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
                 let (mean, error) = mean_and_error(&build.values(2048, 16));
-                assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: ± {error} says nothing");
+                assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: ± {error} is too noisy");
                 assert!(
                     (mean - 1.0).abs() < 2e-3 + 4.0 * error,
                     "{what}, roughness {roughness} at {at}: {mean}"
@@ -57,7 +57,7 @@ fn white_plastic_vanishes_in_a_furnace() {
 }
 
 #[test]
-fn smooth_metal_reflects_by_the_angle() {
+fn smooth_metal_follows_schlick() {
     // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ at 60°.
     let build = scene()
         .environment(1.0)
@@ -69,15 +69,15 @@ fn smooth_metal_reflects_by_the_angle() {
 }
 
 #[test]
-fn every_technique_finds_the_same_light_of_lamps() {
+fn techniques_agree_on_area_lights() {
     for (material, kind) in materials() {
         for (what, build) in lamps_over_a_floor(&kind) {
             let whitted = build.clone().depth(1);
-            // Without occluders, the shadows change nothing, nor does narrow lobes' noise.
+            // Without occluders the shadow mode changes nothing, and neither does the noise of narrow lobes.
             let [off, hard] = [Shadows::Off, Shadows::Hard].map(|kind| whitted.clone().shadows(kind, 1));
             let path = mean_and_error(&by_paths(build, 1).values(512, 16));
             let others = [("whitted", &whitted, 512), ("unshadowed", &off, 512), ("hard", &hard, 512)];
-            // One of the two balls is before the other, and half of a sun is behind a ball.
+            // One of the two balls is in front of the other, and half of the sun is behind a ball.
             let others = if ["two", "half a sun"].contains(&what) { &others[..1] } else { &others[..] };
             for &(technique, build, samples) in others {
                 let (mean, error) = mean_and_error(&build.values(samples, 16));
@@ -94,8 +94,8 @@ fn every_technique_finds_the_same_light_of_lamps() {
 }
 
 #[test]
-fn samples_of_lobes_alone_find_the_light_of_a_lamp() {
-    // Light samples do not find a lamp within glass; without refraction, that glass changes nothing.
+fn lobe_samples_find_area_lights() {
+    // Light samples do not find a light inside glass; without refraction, that glass changes nothing.
     for (material, kind) in materials() {
         let floor = scene()
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
@@ -106,20 +106,20 @@ fn samples_of_lobes_alone_find_the_light_of_a_lamp() {
         let (both, lobes) = (mean_and_error(&lit.values(1024, 16)), mean_and_error(&hidden.values(4096, 16)));
         let error = both.1.hypot(lobes.1);
         assert!(error < 0.02 * both.0, "{material}: {both:?}, {lobes:?}");
-        assert!((both.0 - lobes.0).abs() < 5.0 * error, "{material}: {both:?}, by lobes {lobes:?}");
+        assert!((both.0 - lobes.0).abs() < 5.0 * error, "{material}: {both:?}, lobe samples {lobes:?}");
     }
 }
 
 #[test]
-fn whitted_shows_what_rough_lobes_mirror() {
-    // One more surface behind the lobe: a wide board that shines as a lamp, and one that is lit.
+fn whitted_shows_reflections_in_rough_lobes() {
+    // The surface behind the lobe is a wide board that emits, or one that is lit.
     for (material, kind) in materials() {
         let build = scene()
             .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
             .quad(v(1.0, 0.0, -4.0), v(0.0, 0.0, 8.0), v(0.0, 4.0, 0.0), matte(0.7))
             .point_light(v(-3.0, 5.0, 0.0), 40.0, Falloff::Square)
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
-        // What the diffuse lobe sends on is missing in whitted: compare the specular parts.
+        // Whitted lacks the light that the diffuse lobe scatters on: compare only the specular components.
         let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(1024, 16));
         let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
         if material == "smooth plastic" {
@@ -127,12 +127,12 @@ fn whitted_shows_what_rough_lobes_mirror() {
         }
         let error = whitted.1.hypot(path.1);
         assert!(error < 0.02 * path.0, "{material}: {whitted:?}, {path:?}");
-        assert!((whitted.0 - path.0).abs() < 5.0 * error, "{material}: {whitted:?}, by paths {path:?}");
+        assert!((whitted.0 - path.0).abs() < 5.0 * error, "{material}: {whitted:?}, path-traced {path:?}");
     }
 }
 
 #[test]
-fn photons_and_paths_see_the_same_light_of_smooth_coats_and_metals() {
+fn photons_match_path_on_coats_and_metals() {
     let room = |depth: u32| {
         scene()
             .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), plastic(0.6, 0.0))
@@ -150,7 +150,7 @@ fn photons_and_paths_see_the_same_light_of_smooth_coats_and_metals() {
 }
 
 #[test]
-fn the_parts_of_pictures_of_rough_reflections_add_up() {
+fn rough_reflection_components_add_up() {
     let build = scene()
         .quad(v(-5.0, -1.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -20.0), plastic(0.5, 0.3))
         .sphere(v(-1.2, 0.0, -6.0), 1.0, metal(0.9, 0.3, 0.0))
@@ -179,8 +179,8 @@ fn the_parts_of_pictures_of_rough_reflections_add_up() {
 }
 
 #[test]
-fn a_round_mesh_of_metal_has_no_black_edge() {
-    // Where normals turn away from the viewer, what is reflected is still that of the sky.
+fn round_metal_mesh_has_no_black_edge() {
+    // Where shading normals face away from the viewer, the reflection still shows the sky.
     let ball = lat_long_sphere(12, 16, 1.0, DVec3::ZERO);
     let build = scene()
         .environment(1.0)
@@ -192,7 +192,7 @@ fn a_round_mesh_of_metal_has_no_black_edge() {
 }
 
 #[test]
-fn coarse_smooth_meshes_reflect_no_more_than_arrives() {
+fn coarse_smooth_meshes_conserve_energy() {
     let ball = lat_long_sphere(8, 16, 1.0, DVec3::ZERO);
     for (name, material) in [
         ("polished metal", metal(1.0, 0.01, 0.0)),
@@ -209,7 +209,7 @@ fn coarse_smooth_meshes_reflect_no_more_than_arrives() {
             .pictured(DVec3::ZERO, v(0.0, 0.0, -5.0), 24.0, 32, 32);
         for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 8))] {
             let brightest = build.picture(64, 0).iter().map(|color| color.max_element()).fold(0.0, f64::max);
-            assert!(brightest < 1.15, "{name} by {what}: {brightest}");
+            assert!(brightest < 1.15, "{name} with {what}: {brightest}");
         }
     }
 }

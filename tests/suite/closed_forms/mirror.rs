@@ -8,8 +8,8 @@ use glimt::scene::description::light::Falloff;
 use super::scenes::{Build, emitter, matte, mirror, scene};
 use super::{assert_close, v};
 
-/// Two mirrors y = 0 and y = 1 over x in [0, `length`]; a ray that rises at 45° from (−¼, ½) meets one of them at
-/// x = ¼, 1¼, 2¼, …
+/// Two mirrors y = 0 and y = 1 over x in [0, `length`]; a ray that rises at 45° from (−¼, ½) hits one of them at x = ¼,
+/// 1¼, 2¼, …
 fn corridor(reflectance: f32, length: f64) -> Build {
     let side = |build: Build, y: f64| {
         build.quad(v(0.0, y, -1.0), v(length, 0.0, 0.0), v(0.0, 0.0, 2.0), mirror(reflectance))
@@ -25,8 +25,7 @@ fn the_nth_image_is_the_nth_power() {
         let exact = f64::from(0.9_f32).powi(n as i32);
         assert_close(&format!("{n} images of the sky"), seen.clone().depth(n).value(), exact);
         assert_eq!(seen.depth(n - 1).value(), 0.0);
-        // An emitter at the end of the corridor, facing back.
-        // An emitter at the end of the corridor that faces back, z × y = −x, and one that faces away.
+        // At the end of the corridor, an emitter that faces back, z × y = −x, and one that faces away.
         let (z, y) = (v(0.0, 0.0, 18.0), v(0.0, 18.0, 0.0));
         let seen =
             |u, w| corridor(0.9, length).quad(v(length, -9.0, -9.0), u, w, emitter(2.0)).depth(n).value();
@@ -36,8 +35,8 @@ fn the_nth_image_is_the_nth_power() {
 }
 
 #[test]
-fn a_mirror_is_one_scattering_and_so_is_direct_light() {
-    // Over the mirror floor the eye sees the ceiling at x = 2, which a point light 2 below it lights: E = 8/4, L = r·ρE/π.
+fn mirror_and_direct_light_count_as_one_bounce() {
+    // In the mirror floor the camera sees the ceiling at x = 2, lit by a point light 2 below it: E = 8/4, L = r·ρE/π.
     let seen = scene()
         .quad(v(-5.0, 0.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -10.0), mirror(0.8))
         .quad(v(-5.0, 4.0, -5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, 10.0), matte(0.5))
@@ -49,8 +48,8 @@ fn a_mirror_is_one_scattering_and_so_is_direct_light() {
 }
 
 #[test]
-fn a_lossless_mirror_under_a_uniform_sky_is_invisible() {
-    // Each mirrored ray ends in the sky, L = 1, however often it was mirrored before.
+fn lossless_mirror_under_a_sky_is_invisible() {
+    // Each reflected ray ends in the sky, L = 1, however many mirrors it has hit.
     let seen = scene()
         .sphere(v(-1.0, 0.0, -5.0), 1.0, mirror(1.0))
         .sphere(v(1.0, 0.0, -5.0), 1.0, mirror(1.0))

@@ -1,4 +1,4 @@
-//! The tracer against closed forms: each comment derives the right answer.
+//! The renderer against closed forms: each comment derives the correct result.
 
 mod bodies;
 mod bumps;
@@ -42,7 +42,7 @@ pub const fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// Mean and its standard error over independent values.
+/// Mean and standard error over independent values.
 pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -65,9 +65,8 @@ pub fn assert_close(what: &str, value: f64, exact: f64) {
     assert!((value - exact).abs() <= 1e-5 * exact.abs(), "{what}: {value} is not {exact}");
 }
 
-/// Irradiance per radiance of an unoccluded polygon above the horizon, whatever its orientation: ½·|Σ Θᵢ(Γᵢ·n)|, with
-/// Θᵢ the angle that an edge subtends and Γᵢ the unit normal of its plane through the point (Lambert, *Photometria*,
-/// 1760).
+/// Irradiance per radiance of an unoccluded polygon above the horizon, in any orientation: ½·|Σ Θᵢ(Γᵢ·n)|, with Θᵢ the
+/// angle that an edge subtends and Γᵢ the unit normal of its plane through the point (Lambert, *Photometria*, 1760).
 pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let corners: Vec<DVec3> = polygon.iter().map(|&corner| (corner - point).normalize()).collect();
     let edges = corners.iter().zip(corners.iter().cycle().skip(1));
@@ -78,7 +77,7 @@ pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     (0.5 * sum.sum::<f64>()).abs()
 }
 
-/// A small generator for aimed rays.
+/// A small random generator to aim rays with.
 pub struct Random(pub u64);
 
 impl Random {

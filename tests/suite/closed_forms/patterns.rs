@@ -1,4 +1,4 @@
-//! Lamps with an emission texture.
+//! Area lights with an emission texture.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{AS_IT_IS, Build, emitter, phong};
 use super::{assert_close, lambert, mean_and_error, v};
 
-/// Adds a grey texture of these values, rows from the top.
+/// Adds a gray texture with these values, rows from the top.
 fn greys(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
     let rows: Vec<Vec<Vec3>> = rows.iter().map(|row| row.iter().map(|x| Vec3::splat(*x)).collect()).collect();
     let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
@@ -31,17 +31,17 @@ fn by_paths(build: &Build) -> Build {
 
 const CHECKER: [&[f32]; 2] = [&[5.0, 0.0], &[1.0, 3.0]];
 
-/// Corner of the lamp above the origin, with u × v downwards.
+/// Corner of the light above the origin, with u × v pointing down.
 const CORNER: DVec3 = v(-0.7, 1.0, -0.4);
 const U: DVec3 = v(1.5, 0.2, 0.0);
 const V: DVec3 = v(0.0, 0.1, 1.2);
 
-/// Irradiance E of the checker over a lamp, each square of it by Lambert's formula.
+/// Irradiance E of the checkered light, each square with Lambert's formula.
 fn by_squares(scale: f64) -> f64 {
     let mut irradiance = 0.0;
     for (row, values) in CHECKER.iter().enumerate() {
         for (column, value) in values.iter().enumerate() {
-            // Rows are from the top, v is from the bottom.
+            // Rows are counted from the top, v from the bottom.
             let at = CORNER + U * (0.5 * column as f64) + V * (0.5 - 0.5 * row as f64);
             let (s, t) = (U * 0.5, V * 0.5);
             let form = lambert(DVec3::ZERO, DVec3::Y, &[at, at + s, at + s + t, at + t]);
@@ -52,14 +52,14 @@ fn by_squares(scale: f64) -> f64 {
 }
 
 #[test]
-fn a_checker_on_a_quad_lights_by_the_sum_of_its_squares() {
+fn checkered_quad_light_sums_its_squares() {
     let mut lit = at_origin();
     let texture = greys(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let lit = lit.quad(CORNER, U, V, shining(texture, 2.0));
     assert_irradiance("whitted", &lit, by_squares(2.0));
     assert_irradiance("path", &by_paths(&lit), by_squares(2.0));
     assert_hard("one ray decides", &lit, by_squares(2.0));
-    // Mirrored in a place of its own: no texel of it counts elsewhere.
+    // Mirrored, in a different place: no texel from elsewhere counts.
     let half = lit.with(|scene| scene.textures[0].repeat = Vec2::new(-1.0, 1.0));
     let turned = half.values(256, 64);
     let (mean, error) = mean_and_error(&turned);
@@ -67,7 +67,7 @@ fn a_checker_on_a_quad_lights_by_the_sum_of_its_squares() {
 }
 
 #[test]
-fn the_same_on_a_mesh_whose_corners_have_coordinates() {
+fn checkered_mesh_light_sums_its_squares() {
     for (mirror, order) in [(1.0, [0, 1, 2, 3]), (-1.0, [0, 3, 2, 1])] {
         let corners = [CORNER, CORNER + U, CORNER + U + V, CORNER + V];
         let uvs = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
@@ -110,7 +110,7 @@ fn by_directions(build: &Build) -> f64 {
 }
 
 #[test]
-fn every_shape_shines_by_the_texture_where_it_is() {
+fn every_shape_emits_its_texture_in_place() {
     let (p, q) = (v(0.4, 1.1, 0.3), v(-0.3, 0.7, -0.2));
     let shapes = [
         ("sphere", Shape::Sphere { center: p, radius: 0.5 }),
@@ -128,7 +128,7 @@ fn every_shape_shines_by_the_texture_where_it_is() {
         let texture = greys(&mut lit, &rows, TextureFilter::Bilinear, Vec2::new(2.0, 3.0));
         let lit = lit.shape(shape, shining(texture, 1.0));
         let exact = 0.7 * by_directions(&lit) / PI;
-        assert!(exact > 0.01, "{name} is too dim to tell");
+        assert!(exact > 0.01, "{name} is too dim");
         for (how, lit) in [("whitted", lit.clone()), ("path", by_paths(&lit))] {
             let (mean, error) = mean_and_error(&lit.values(256, 64));
             assert!(error < 0.01 * exact, "{name}, {how}: ± {error} of {exact}");
@@ -139,7 +139,7 @@ fn every_shape_shines_by_the_texture_where_it_is() {
 }
 
 #[test]
-fn a_texture_of_one_colour_is_that_colour() {
+fn constant_emission_texture_equals_its_color() {
     let plain = at_origin().quad(CORNER, U, V, emitter(3.0));
     for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
         let mut lit = at_origin();
@@ -157,14 +157,14 @@ fn a_texture_of_one_colour_is_that_colour() {
 }
 
 #[test]
-fn a_black_texture_is_no_lamp() {
+fn black_emission_texture_emits_nothing() {
     let mut lit = at_origin();
     let texture = greys(&mut lit, &[&[0.0]], TextureFilter::Nearest, Vec2::ONE);
     assert!(lit.quad(CORNER, U, V, shining(texture, 4.0)).world().lights.is_empty());
 }
 
 #[test]
-fn a_lamp_is_as_strong_as_the_mean_of_its_texture() {
+fn light_power_follows_the_mean_of_its_texture() {
     let strength = |build: &Build| {
         let world = build.world();
         let bounds = world.lights.iter().filter_map(|(_, light)| light.bounds());
@@ -177,9 +177,9 @@ fn a_lamp_is_as_strong_as_the_mean_of_its_texture() {
     assert_close("power", strength(&patterned), strength(&plain));
 }
 
-/// Adds so many lamps that vertices pick some of them.
+/// Adds enough lights that vertices sample some of them.
 #[test]
-fn picked_lamps_have_their_textures() {
+fn sampled_lights_keep_their_textures() {
     let mut build = at_origin();
     let texture = greys(&mut build, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let cells = 7_u32;

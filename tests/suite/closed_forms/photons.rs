@@ -1,4 +1,4 @@
-//! Light by photons, against closed forms and against paths.
+//! Photon-mapped light, against closed forms and path tracing.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -17,7 +17,7 @@ use super::global::{assert_near, by_paths};
 use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, phong, scene};
 use super::{mean_and_error, v};
 
-/// A box of quads with their fronts inside.
+/// A box of quads with inward fronts.
 fn room(material: impl Fn() -> glimt::scene::description::Material) -> Build {
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
@@ -32,15 +32,16 @@ fn room(material: impl Fn() -> glimt::scene::description::Material) -> Build {
         .seen(v(0.1, 0.2, -0.3), v(0.3, -1.0, 0.2))
 }
 
-/// A light without size in the middle of a small ball of glass. All of its light goes straight through the surface, so that it
-/// arrives by glass alone. Radiance in glass is over n²; outside the intensity is 1.
+/// A point light in the center of a small glass ball. All of its light leaves straight through the surface, so it
+/// arrives only through glass. Radiance in glass is divided by n²; outside the intensity is 1.
 fn in_glass(build: Build, at: DVec3) -> Build {
     build.point_light(at, 1.0 / (1.5 * 1.5), Falloff::Square).sphere(at, 0.05, glass(1.5))
 }
 
 #[test]
-fn what_is_stored_in_a_closed_room_is_the_power_and_how_often_photons_arrive_is_known() {
-    // All of Φ comes by glass alone, each photon once; thrown back from there are ρ·Φ, by as many arrivals, of variance ρ·(1 − ρ).
+fn stored_photons_carry_the_emitted_power() {
+    // All of Φ arrives through glass, each photon once; the walls reflect ρ·Φ in the same number of hits, with variance
+    // ρ·(1 − ρ).
     for (reflectance, count) in [(0.5_f64, 40_000_u32), (0.8, 40_000)] {
         let build = in_glass(room(|| matte(reflectance as f32)), v(0.2, -0.1, 0.3)).depth(10_000);
         let (world, token) = (build.world(), CancelToken::new());
@@ -63,7 +64,7 @@ fn what_is_stored_in_a_closed_room_is_the_power_and_how_often_photons_arrive_is_
 }
 
 #[test]
-fn where_nothing_mirrors_or_refracts_no_photons_are_sent() {
+fn no_photons_without_mirrors_or_glass() {
     let build = room(|| matte(0.5)).point_light(v(0.2, -0.1, 0.3), 1.0, Falloff::Square).photons(100, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
@@ -74,11 +75,11 @@ fn where_nothing_mirrors_or_refracts_no_photons_are_sent() {
 }
 
 #[test]
-fn an_integrating_sphere_is_lit_everywhere_alike_by_photons() {
-    // R = 1, I = 1 W/sr at x = .5, ρ = .5: indirect irradiance 1; L = ρ/π·(1 + I·cos/d²). Bare, its light is followed from the eye;
-    // in glass, photons bring it.
+fn integrating_sphere_has_uniform_photon_light() {
+    // R = 1, I = 1 W/sr at x = .5, ρ = .5: indirect irradiance 1; L = ρ/π·(1 + I·cos/d²). Without glass, camera paths
+    // find the light; in glass, photons do.
     let at = v(0.5, 0.0, 0.0);
-    // Kernels are as wide as the light's irradiance allows.
+    // The kernel radius is as wide as the variation of the irradiance allows.
     for (to, exact, radius) in
         [(v(1.0, 0.0, 0.0), 0.795_774_715_5, 0.06), (v(-1.0, 0.0, 0.0), 0.229_890_473_4, 0.16)]
     {
@@ -91,7 +92,7 @@ fn an_integrating_sphere_is_lit_everywhere_alike_by_photons() {
 }
 
 #[test]
-fn a_furnace_sums_its_bounces_to_the_depth_asked_for() {
+fn photon_furnace_sums_its_bounces_up_to_depth() {
     // L = E·(1 + ρ + … + ρᵏ).
     let reflectance = 0.5_f64;
     for depth in [0, 1, 2, 3, 8] {
@@ -102,9 +103,9 @@ fn a_furnace_sums_its_bounces_to_the_depth_asked_for() {
 }
 
 #[test]
-fn a_furnace_with_a_glowing_ball_in_glass_is_even() {
-    // All emits 1 − ρ and throws back ρ, the ball in the glass with ρ = 0: 1 is seen everywhere. A third of it comes from that ball
-    // through the glass, which photons bring.
+fn furnace_with_a_glowing_ball_in_glass_is_even() {
+    // Every surface emits 1 − ρ and reflects ρ; the ball in the glass has ρ = 0. The radiance is 1 everywhere. A third
+    // of it comes from that ball through the glass, carried by photons.
     let reflectance = 0.9;
     let furnace = room(|| phong(reflectance, 0.0, 1.0, 1.0 - reflectance))
         .sphere(v(0.0, 0.0, -0.4), 0.2, emitter(1.0))
@@ -119,7 +120,7 @@ fn a_furnace_with_a_glowing_ball_in_glass_is_even() {
     }
 }
 
-/// A room with a lamp, a mirror ball and a glass ball, seen whole.
+/// A room with an area light, a mirror ball and a glass ball, seen as a whole.
 fn caustics(depth: u32) -> Build {
     let white = || matte(0.7);
     let mut build = room(white);
@@ -136,7 +137,7 @@ fn mean(picture: &[DVec3]) -> f64 {
     picture.iter().map(|c| c.x).sum::<f64>() / picture.len() as f64
 }
 
-/// A room that is lit through the glass around its lamp alone, with a glossy floor and a mirror ball.
+/// A room lit only through the glass around its light, with a glossy floor and a mirror ball.
 fn caustics_alone(depth: u32) -> Build {
     let mut build = room(|| matte(0.7));
     build.scene.objects.remove(3);
@@ -149,7 +150,7 @@ fn caustics_alone(depth: u32) -> Build {
         .depth(depth)
 }
 
-/// Means of pictures by paths and by photons, with their standard errors.
+/// Means of path-traced and photon-mapped images, with their standard errors.
 pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64)) -> [(f64, f64); 2] {
     let means = |build: &Build, samples| -> (f64, f64) {
         let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(samples, seed))).collect();
@@ -159,17 +160,17 @@ pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64,
     [means(&by_paths(build.clone(), depth), samples[0]), means(&by_photons, samples[1])]
 }
 
-/// Checks that both see the same light: within 4 standard errors, which are at most this fraction of it, and some slack
-/// for kernels at edges.
+/// Checks that both methods give the same light: within 4 standard errors, which are at most this fraction of it, and
+/// some slack for kernels at edges.
 #[track_caller]
 pub fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_error: f64, slack: f64) {
     let error = da.hypot(db);
     assert!(error < most_error * a, "{what}: {error} of {a}");
-    assert!((a - b).abs() < 4.0 * error + slack * a, "{what}: {b} ± {db}, by paths {a} ± {da}");
+    assert!((a - b).abs() < 4.0 * error + slack * a, "{what}: {b} ± {db}, path-traced {a} ± {da}");
 }
 
 #[test]
-fn photons_and_paths_see_the_same_light_to_every_depth() {
+fn photons_match_path_at_every_depth() {
     for depth in [1, 2, 3, 6] {
         let means = both(&caustics(depth), depth, [128, 16], (10_000, 0.04));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
@@ -177,7 +178,7 @@ fn photons_and_paths_see_the_same_light_to_every_depth() {
 }
 
 #[test]
-fn photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass() {
+fn photons_match_path_with_light_only_by_glass() {
     for depth in [2, 3, 6] {
         let means = both(&caustics_alone(depth), depth, [128, 16], (10_000, 0.01));
         assert_same_light(&format!("depth {depth}"), means, 1e-2, 3e-3);
@@ -185,8 +186,9 @@ fn photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass() {
 }
 
 #[test]
-fn smooth_meshes_throw_back_what_photons_bring_as_paths_see_it() {
-    // A wall whose normals are bent to the floor; about half of the light that the facets would reflect arrives there.
+fn photons_match_path_on_smooth_meshes() {
+    // A wall whose shading normals tilt towards the floor; about half of the light that its facets would reflect
+    // reaches the floor.
     let wall = TriangleMesh {
         positions: vec![
             Vec3::new(-1.0, 0.0, -0.5),
@@ -211,8 +213,9 @@ fn smooth_meshes_throw_back_what_photons_bring_as_paths_see_it() {
 }
 
 #[test]
-fn a_sun_lights_what_is_under_water_without_end() {
-    // The ground under a plane of water gets E·cosᵢ·T; what it throws back to the surface comes by one more scattering.
+fn sun_lights_the_ground_under_water() {
+    // The ground under an infinite plane of water receives E·cosᵢ·T; light it reflects back from the surface takes
+    // another bounce.
     let water = || glass(1.33);
     let angle = 40.0_f64.to_radians();
     let to_sun = v(angle.sin(), angle.cos(), 0.0);
@@ -234,8 +237,9 @@ fn a_sun_lights_what_is_under_water_without_end() {
 }
 
 #[test]
-fn a_ball_lens_throws_the_caustic_that_is_known() {
-    // n = 1.5, R = 1, light along the axis, by two surfaces: E/E₀ on the plane z = 3 at two distances from the axis.
+fn ball_lens_casts_the_analytic_caustic() {
+    // n = 1.5, R = 1, light along the axis, through two surfaces: E/E₀ on the plane z = 3 at two distances from the
+    // axis.
     for (distance, exact) in [(0.206_407_1, 0.813_230_5), (0.456_371_9, 0.552_326_4)] {
         let (x, y) = (0.6 * distance, 0.8 * distance);
         let lens = scene()
@@ -255,8 +259,8 @@ fn a_ball_lens_throws_the_caustic_that_is_known() {
 }
 
 #[test]
-fn no_light_comes_through_a_wall_without_thickness() {
-    // A quad before a lamp and a mirror, which lights it once more.
+fn photons_do_not_leak_through_a_thin_wall() {
+    // A quad in front of a light and a mirror, which lights it a second time.
     let wall = scene().quad(v(-1.0, -1.0, 0.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), matte(0.8));
     let mirrored = wall.quad(v(-1.0, -1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), mirror(0.9));
     let lit = mirrored.point_light(v(0.2, 0.3, 0.5), 1.0, Falloff::Square).depth(8).photons(4000, 0.3);
@@ -265,7 +269,7 @@ fn no_light_comes_through_a_wall_without_thickness() {
         mean(&seen.values(16, 4).iter().map(|&x| DVec3::splat(x)).collect::<Vec<_>>())
     };
     let (bright, dark) = (caustic(v(0.1, 0.2, 0.9)), caustic(v(0.1, 0.2, -0.9)));
-    // From the lamp's image, (.2, .3, 1.5): .8/π·.9·cos/d².
+    // From the light's mirror image, (.2, .3, 1.5): .8/π·.9·cos/d².
     let squared = (v(0.2, 0.3, 1.5) - v(0.3, -0.4, 0.0)).length_squared();
     let exact = 0.8 / PI * 0.9 * 1.5 * squared.powf(-1.5);
     assert!((bright / exact - 1.0).abs() < 0.08, "{bright} is not {exact}");
@@ -273,7 +277,7 @@ fn no_light_comes_through_a_wall_without_thickness() {
 }
 
 #[test]
-fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
+fn photon_bits_ignore_threads_and_tiles() {
     let build = caustics(6).photons(5000, 0.0);
     let (world, settings, token) = (build.world(), build.settings(2), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
@@ -302,7 +306,7 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };
     let at_once = render(&all, whole, 0..4);
-    // Parts of the samples, with maps of their own alone.
+    // Parts of the samples, with photon maps of only those samples.
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
@@ -317,7 +321,7 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
             assert_eq!(render(&maps, whole, samples.clone()), own, "samples {samples:?}");
         }
     }
-    // Rows of pixels alone.
+    // Only rows of pixels.
     for y in 0..16 {
         let row = render(&all, Rect { x: 0, y, width: 16, height: 1 }, 0..4);
         assert_eq!(row, at_once[64 * y as usize..][..64], "row {y}");
@@ -325,8 +329,8 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
 }
 
 #[test]
-fn meshes_whose_files_say_that_they_are_of_glass_are_aimed_at() {
-    // The mesh fills about a hundredth of what its lamp sees.
+fn photons_are_aimed_at_meshes_of_file_glass() {
+    // The mesh fills about a hundredth of the light's field of view.
     let mesh = boxes(&[(DVec3::ZERO, 0.4, 0)]);
     let build = room(|| matte(0.5))
         .own_mesh(mesh, vec![file_material(9, 1.5)])

@@ -18,7 +18,7 @@ use glimt::world::{Geometry, Hit};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{Random, v};
 
-/// Surface that a ray from outside towards a point hits.
+/// The surface hit by a ray from outside towards a point.
 fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Option<SurfacePoint> {
     let origin = (at + random.direction() * far).as_vec3();
     let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
@@ -34,7 +34,7 @@ pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
     Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction)
 }
 
-/// Number of rays, of all tries, that leave a convex shape outwards and hit it again.
+/// Number of tries in which a ray leaves a convex shape outwards and hits it again.
 pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
     let world = build.world();
     let (mut hits, mut tried) = (0, 0);
@@ -48,7 +48,7 @@ pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, t
     (hits, tried)
 }
 
-/// Places within 10⁶ in every direction, the first such that the shape passes near the origin.
+/// Positions within 10⁶ in every direction, the first such that the shape passes near the origin.
 pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
     let mut places = vec![v(0.0, -size, 0.0), random.direction() * size, DVec3::ZERO];
     for far in [1.0, 1e2, 1e4, 1e6] {
@@ -61,7 +61,7 @@ pub fn places(random: &mut Random, size: f64) -> Vec<DVec3> {
 
 #[test]
 fn no_convex_shape_hits_itself() {
-    // A convex body lies on one side of the tangent plane: what leaves on the other side never meets it.
+    // A convex body lies on one side of its tangent plane: a ray that leaves on the other side never hits it.
     let mut random = Random(11);
     for size in [1e-3, 1.0, 1e3, 1e6] {
         for center in places(&mut random, size) {
@@ -94,7 +94,7 @@ fn no_convex_shape_hits_itself() {
     }
 }
 
-/// A room from −size/2 to size/2: its corners, and its walls by corners, which go around them as seen from inside.
+/// A room from −size/2 to size/2: its corners, and its walls as corner indices in order as seen from inside.
 fn room(size: DVec3) -> ([DVec3; 8], [[usize; 4]; 6]) {
     let corner = |i: usize| {
         size * (DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) - DVec3::splat(0.5))
@@ -115,8 +115,9 @@ fn room_of_triangles(size: DVec3) -> TriangleMesh {
 }
 
 #[test]
-fn no_ray_leaves_a_closed_room_by_its_edges() {
-    // Rays go to walls right beside edges and corners, and on from there to any side within: they must hit another wall.
+fn no_ray_escapes_through_room_edges() {
+    // Rays go to walls very close to edges and corners, and from there in any inward direction: they must hit another
+    // wall.
     let mut random = Random(29);
     for size in [v(1.0, 1.0, 1.0), v(8.0, 0.4, 2.0), v(200.0, 0.02, 0.02), v(3e-3, 5e-3, 4e-3)] {
         let small = size.min_element();
@@ -128,7 +129,7 @@ fn no_ray_leaves_a_closed_room_by_its_edges() {
                 let transform = Transform::scale_rotate_translate(DVec3::ONE, angles, place);
                 let (mut lost, mut tried) = (0, 0);
                 for _ in 0..3000 {
-                    // Aim at a point beside one, two or three walls.
+                    // Aim at a point close to one, two or three walls.
                     let within = |random: &mut Random| 1.0 - 2.0 * random.unit();
                     let mut at = [0; 3].map(|_| 0.495 * within(&mut random));
                     let from = transform.point(DVec3::from(at) * size);
@@ -159,14 +160,15 @@ fn no_ray_leaves_a_closed_room_by_its_edges() {
     }
 }
 
-/// A cylinder about the middle whose half axis is across or along `middle`, so that it passes through the origin.
+/// A cylinder around the center whose half axis is across or along `middle`, so that its side passes through the
+/// origin.
 fn bar(middle: DVec3, towards: DVec3, radius: f64) -> Shape {
     let flat = towards - middle * (middle.dot(towards) / middle.length_squared());
     let half = if flat.length() > 1e-6 * towards.length() { flat } else { middle };
     Shape::Cylinder { a: middle - half, b: middle + half, radius, caps: true }
 }
 
-/// A cone whose side passes through the origin: its tip is up a tangent, its base beyond.
+/// A cone whose side passes through the origin: its tip is up along a tangent, its base on the other side.
 fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
     let down = normal.cross(towards).normalize();
     let tip = down * -radius;
@@ -176,8 +178,9 @@ fn cone_through_origin(normal: DVec3, towards: DVec3, radius: f64) -> Shape {
 }
 
 #[test]
-fn shapes_through_the_origin_do_not_hit_themselves_there() {
-    // The coordinates of the hit are nearly 0 though the shape is large: the error of the sums is that of their terms.
+fn shapes_through_the_origin_do_not_self_hit() {
+    // The coordinates of the hit are nearly 0 although the shape is large: the error of the sums is the error of their
+    // terms.
     let mut random = Random(3);
     for _ in 0..200 {
         let (u, w) = (random.direction() * 1e4, random.direction() * 1e4);
@@ -207,7 +210,7 @@ fn shapes_through_the_origin_do_not_hit_themselves_there() {
 }
 
 #[test]
-fn what_enters_a_ball_meets_its_other_side_and_leaves() {
+fn ray_into_a_ball_hits_its_back_and_leaves() {
     // Inside, the next hit is the back of the sphere; beyond it there is nothing.
     let mut random = Random(17);
     for radius in [1e-3, 0.75, 1.0, 1e3, 1e6] {
@@ -218,7 +221,7 @@ fn what_enters_a_ball_meets_its_other_side_and_leaves() {
                 let Some(surface) = aimed(&world.geometry, &mut random, at, radius * 4.0) else { continue };
                 let inner = leaving(&mut random, &surface, -surface.normal);
                 let hit = world.geometry.closest(&inner);
-                let Some(hit) = hit else { panic!("out of the ball {radius} at {center} without a hit") };
+                let Some(hit) = hit else { panic!("no exit hit: ball {radius} at {center}") };
                 let back = world.geometry.surface(&inner, &hit);
                 assert!(back.normal.dot(inner.direction) > 0.0, "ball {radius} at {center}");
                 let outer = leaving(&mut random, &back, back.normal);
@@ -229,8 +232,8 @@ fn what_enters_a_ball_meets_its_other_side_and_leaves() {
 }
 
 #[test]
-fn a_closed_mesh_has_no_leaks() {
-    // From inside every ray hits; aimed at vertices and points of edges the test itself decides nothing but ties.
+fn closed_mesh_has_no_leaks() {
+    // Every ray from inside hits; for rays aimed at vertices and edges, the test decides nothing but ties.
     let mut random = Random(23);
     let far = v(148_376.0, 1234.0, -223_423.0);
     let at_origin = lat_long_sphere(16, 16, 2.0, DVec3::ZERO);
@@ -263,7 +266,7 @@ fn a_closed_mesh_has_no_leaks() {
     }
 }
 
-/// One of everything, of size 2ᵏ.
+/// One of every kind, of size 2ᵏ.
 fn of_everything(k: i32) -> Build {
     let s = 2.0_f64.powi(k);
     let intensity = (8.0 * 4.0_f64.powi(k)) as f32;
@@ -321,7 +324,7 @@ fn of_everything(k: i32) -> Build {
 }
 
 #[test]
-fn a_scene_of_any_scale_gives_the_same_bits() {
+fn power_of_two_scale_keeps_the_bits() {
     // Powers of two scale every number without rounding; nothing may depend on the unit of length.
     let picture = of_everything(0).picture(4, 9);
     for k in [-30, -7, 1, 12, 30] {
@@ -332,8 +335,8 @@ fn a_scene_of_any_scale_gives_the_same_bits() {
 }
 
 #[test]
-fn no_split_of_the_work_changes_a_bit() {
-    // A sample is a function of the scene, its pixel, its number and the seed.
+fn splitting_the_work_keeps_the_bits() {
+    // A sample is a function of the scene, its pixel, its index and the seed.
     for integrator in Integrator::ALL {
         assert_no_split(&of_everything(0).with(|scene| scene.render.integrator = *integrator));
     }
@@ -365,7 +368,7 @@ fn assert_no_split(build: &Build) {
 }
 
 #[test]
-fn rays_that_are_no_rays_hit_nothing() {
+fn invalid_rays_hit_nothing() {
     let world = of_everything(0).with(|_| ()).world();
     let good = Ray::new(Vec3::new(0.1, 0.3, 0.5), Vec3::NEG_Z);
     assert!(world.geometry.closest(&good).is_some());
@@ -385,8 +388,8 @@ fn rays_that_are_no_rays_hit_nothing() {
 }
 
 #[test]
-fn the_tree_finds_what_a_look_at_every_shape_finds() {
-    // Many shapes at the same distance: the lowest number wins, in any order that the tree has them.
+fn tree_finds_the_same_hit_as_brute_force() {
+    // Many shapes at the same distance: the lowest index wins, whatever their order in the tree.
     let mut random = Random(31);
     let mut build = scene();
     for _ in 0..60 {
@@ -420,7 +423,7 @@ fn the_tree_finds_what_a_look_at_every_shape_finds() {
 
 #[test]
 fn fresnel_at_every_angle_and_index() {
-    // Both polarisations in double precision from the same f32 cosine and index; where the index does not change, 0.
+    // Both polarizations in double precision from the same f32 cosine and index; 0 where the index does not change.
     let mut random = Random(41);
     for _ in 0..100_000 {
         let cosine = 10.0_f64.powf(-6.0 * random.unit()) as f32;

@@ -1,4 +1,4 @@
-//! Disks, cylinders, cones and tori against their distance functions, which are at most as steep as the distance.
+//! Disks, cylinders, cones and tori against their distance functions, whose slope is at most 1.
 
 use glimt::geometry::Ray;
 use glimt::geometry::ray::offset_origin;
@@ -21,8 +21,7 @@ fn axial(p: DVec3, origin: DVec3, axis: DVec3) -> DVec2 {
     DVec2::new(p.dot(n), p.cross(n).length())
 }
 
-/// Signed distance bound of a shape: nowhere steeper than the distance, negative inside the closed shape, 0 on its
-/// surface.
+/// Signed distance bound of a shape: a lower bound on the distance, negative inside the closed shape, 0 on its surface.
 fn distance(shape: &Shape, p: DVec3) -> f64 {
     match *shape {
         Shape::Cylinder { a, b, radius, .. } => {
@@ -42,7 +41,7 @@ fn distance(shape: &Shape, p: DVec3) -> f64 {
     }
 }
 
-/// Greatest length of a shape.
+/// Greatest extent of a shape.
 fn reach(shape: &Shape) -> f64 {
     match *shape {
         Shape::Disk { center, radius, .. } => center.length() + radius,
@@ -53,7 +52,7 @@ fn reach(shape: &Shape) -> f64 {
     }
 }
 
-/// Size of the smallest of its parts.
+/// Size of the shape's smallest feature.
 fn size(shape: &Shape) -> f64 {
     match *shape {
         Shape::Cylinder { a, b, radius, .. } => radius.min((b - a).length()),
@@ -63,9 +62,9 @@ fn size(shape: &Shape) -> f64 {
     }
 }
 
-/// Whether the line crosses the surface by more than `allowed` between two distances, by halving: around the middle of
-/// an interval, the surface is no nearer than its distance bound. Intervals of 10⁻⁵ of the shape's size are examined in
-/// the middle only, as a line in the surface would otherwise take for ever.
+/// Whether the line crosses the surface by more than `allowed` between two distances. Bisects: around the center of an
+/// interval, the surface is no nearer than its distance bound. Intervals of 10⁻⁵ of the shape's size are only tested at
+/// their center, because a line in the surface would otherwise take forever.
 fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64) -> bool {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let length = ray.direction.as_dvec3().length();
@@ -79,8 +78,8 @@ fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64
     crosses(shape, ray, from, middle, sign, allowed) || crosses(shape, ray, middle, to, sign, allowed)
 }
 
-/// Checks that the hit is on the surface and no surface was crossed before it, or at all without a hit. Returns whether
-/// there is a hit.
+/// Checks that the hit is on the surface and that the ray crosses no surface before it, or none at all without a hit.
+/// Returns whether there is a hit.
 #[track_caller]
 fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let far = reach(shape) + ray.origin.as_dvec3().length();
@@ -103,7 +102,7 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let error = f64::from(surface.error.length());
     assert!(off.abs() <= error, "{off} over {error} {shape:?} {ray:?}");
     assert!((surface.normal.length() - 1.0).abs() < 1e-6);
-    // The front is outwards, if there is room to decide.
+    // The front faces outwards, where there is room to decide.
     let out = surface.point.as_dvec3() + surface.normal.as_dvec3() * (4.0 * error);
     let tells = error < 0.05 * size(shape);
     assert!(!tells || distance(shape, out) > 0.0, "{shape:?} {ray:?} {surface:?}");
@@ -137,7 +136,7 @@ pub fn random_in(random: &mut Random, center: DVec3, size: f64) -> DVec3 {
 }
 
 #[test]
-fn tori_are_hit_where_their_distance_is_nothing() {
+fn torus_hits_match_its_distance_function() {
     let mut random = Random(5);
     let (mut rays, mut hits) = (0, 0);
     for slimness in [1e-3, 0.03, 0.2, 0.5, 0.8, 0.97, 0.9999] {
@@ -158,13 +157,13 @@ fn tori_are_hit_where_their_distance_is_nothing() {
                     1 => aim(center + n * (0.3 * random.signed()), random_in(&mut random, center, 3.0)),
                     2 => aim(center + out * radius, random_in(&mut random, center, 3.0)),
                     3 => grazing(&mut random, on, normal, 1.3),
-                    // Along the axis, at and near the circles of its tops and its borders.
+                    // Along the axis, at and near its top and boundary circles.
                     4 => {
                         let across = [0.0, radius, radius - tube, radius + tube][i / 6 % 4];
                         let off = if i % 4 < 2 { 0.0 } else { 10.0_f64.powf(-8.0 * random.unit()) };
                         Ray::new((center + out * (across + off) - n * 5.0).as_vec3(), n.as_vec3())
                     }
-                    // In the plane of the circle, and there through the axis.
+                    // In the plane of the circle, and through the axis in that plane.
                     _ if i % 12 < 6 => aim(center + out * 6.0, center),
                     _ => aim(
                         center + n.cross(random.direction()) * 6.0,
@@ -183,8 +182,8 @@ fn tori_are_hit_where_their_distance_is_nothing() {
 }
 
 #[test]
-fn what_leaves_a_torus_next_meets_it_where_the_distance_says() {
-    // From the side that a ray starts on, out of the hole too, and to the other side of the tube.
+fn rays_from_a_torus_hit_it_at_the_next_zero() {
+    // On the side where the ray starts, out of the hole as well, and to the other side of the tube.
     let mut random = Random(29);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {
@@ -203,7 +202,7 @@ fn what_leaves_a_torus_next_meets_it_where_the_distance_says() {
                         let ray = leaving(&mut random, &surface, surface.normal * side);
                         assert!(f64::from(side) * distance(&shape, ray.origin.as_dvec3()) > 0.0);
                         let again = check(&shape, &geometry, &ray, f64::from(side));
-                        assert!(again || side > 0.0, "out of the tube without a hit: {shape:?} {ray:?}");
+                        assert!(again || side > 0.0, "no exit hit: {shape:?} {ray:?}");
                     }
                 }
                 assert!(met > 50, "{met} {shape:?}");
@@ -213,7 +212,7 @@ fn what_leaves_a_torus_next_meets_it_where_the_distance_says() {
 }
 
 #[test]
-fn cylinders_and_cones_are_hit_where_their_distance_is_nothing() {
+fn cylinder_and_cone_hits_match_their_distance() {
     let mut random = Random(13);
     let (mut rays, mut hits) = (0, 0);
     for i in 0..400 {
@@ -238,7 +237,7 @@ fn cylinders_and_cones_are_hit_where_their_distance_is_nothing() {
             let ray = match j % 6 {
                 0 => aim(random_in(&mut random, center, 9.0), inside + out * (radius * random.unit())),
                 1 => aim(inside, random_in(&mut random, center, 3.0)),
-                // To the rim, and to the tip.
+                // Towards the rim and the tip.
                 2 => aim(random_in(&mut random, center, 5.0), low + out * radius),
                 3 => aim(random_in(&mut random, center, 5.0), high),
                 // Along the axis and along the side.
@@ -264,7 +263,7 @@ fn cylinders_and_cones_are_hit_where_their_distance_is_nothing() {
 }
 
 #[test]
-fn without_caps_the_next_hit_of_the_side_remains() {
+fn rays_pass_missing_caps_to_the_side() {
     let mut random = Random(37);
     let mut through = 0;
     for i in 0..200 {
@@ -305,8 +304,8 @@ fn without_caps_the_next_hit_of_the_side_remains() {
 }
 
 #[test]
-fn convex_round_shapes_do_not_hit_themselves() {
-    // A convex body lies on one side of the tangent plane, its side without the caps too.
+fn convex_round_shapes_do_not_self_hit() {
+    // A convex body lies on one side of its tangent plane, even without the caps.
     let mut random = Random(19);
     for size in [1e-8, 1e-4, 1.0, 1e4, 1e8] {
         for center in places(&mut random, size) {
@@ -324,7 +323,7 @@ fn convex_round_shapes_do_not_hit_themselves() {
 }
 
 #[test]
-fn what_enters_a_closed_round_shape_meets_it_from_inside() {
+fn ray_into_a_closed_round_shape_hits_its_back() {
     let mut random = Random(43);
     for size in [1e-8, 1.0, 1e8] {
         for center in places(&mut random, size) {
@@ -337,7 +336,7 @@ fn what_enters_a_closed_round_shape_meets_it_from_inside() {
                     let Some(hit) = geometry.closest(&ray) else { continue };
                     let surface = geometry.surface(&ray, &hit);
                     let inner = leaving(&mut random, &surface, -surface.normal);
-                    // Next to an edge the error of the point may be through the other side.
+                    // Next to an edge, the error of the point may cross to the other side.
                     if distance(&shape, inner.origin.as_dvec3()) < 0.0 {
                         let back = geometry.closest(&inner);
                         let back = back.unwrap_or_else(|| panic!("a leak of {shape:?} {inner:?}"));

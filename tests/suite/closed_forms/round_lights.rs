@@ -10,15 +10,15 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{Build, emitter, matte, scene};
 use super::{assert_close, v};
 
-/// Irradiance E at the origin, facing up, of a shape that emits L = 1: π times the part of a cosine-weighted hemisphere
-/// that hits a front.
+/// Irradiance E at the origin, facing up, from a shape that emits L = 1: π times the fraction of a cosine-weighted
+/// hemisphere that hits a front.
 fn by_directions(shape: &Shape) -> f64 {
     const RINGS: u32 = 1500;
     let geometry = scene().shape(shape.clone(), matte(0.5)).world().geometry;
     let mut fronts = 0_u32;
     for i in 0..RINGS {
         for j in 0..RINGS {
-            // The golden ratio's multiples shift each ring against its neighbours.
+            // Multiples of the golden ratio offset each ring against its neighbors.
             let sin2 = (f64::from(i) + 0.5) / f64::from(RINGS);
             let phi =
                 TAU * ((f64::from(j) + 0.5) / f64::from(RINGS) + 0.618_033_988_75 * f64::from(i)).fract();
@@ -56,7 +56,7 @@ fn a_disk_on_its_axis() {
 
 #[test]
 fn a_parallel_disk_beside() {
-    // F = ½·(1 − (Z − 2R²)/√(Z² − 4R²)), Z = 1 + H² + R² in units of the distance beside (Howell, *A Catalog of
+    // F = ½·(1 − (Z − 2R²)/√(Z² − 4R²)), Z = 1 + H² + R² in units of the lateral distance (Howell, *A Catalog of
     // Radiation Heat Transfer Configuration Factors*, B-13).
     let (radius, height, beside): (f64, f64, f64) = (0.8, 1.2, 0.9);
     let (h, r) = (height / beside, radius / beside);
@@ -67,15 +67,15 @@ fn a_parallel_disk_beside() {
     assert_close("the reference", (by_directions(&shape) / exact - 1.0).abs().max(1e-3), 1e-3);
 }
 
-/// Checks the irradiance by area against that by directions.
+/// Compares the irradiance from area samples with the irradiance over directions.
 #[track_caller]
 fn assert_same(shape: &Shape) {
     let exact = by_directions(shape);
     if exact == 0.0 {
-        assert_eq!(lit(shape).value(), 0.0, "{shape:?} shows its inside only");
+        assert_eq!(lit(shape).value(), 0.0, "only the inside of {shape:?} is visible");
         return;
     }
-    assert!(exact > 0.01, "{shape:?} is too dim to tell: {exact}");
+    assert!(exact > 0.01, "{shape:?} is too dim: {exact}");
     for (samples, shadow_samples) in [(1024, 1), (64, 16)] {
         let values = lit(shape).shadows(Shadows::Soft, shadow_samples).values(samples, 64);
         let (mean, error) = super::mean_and_error(&values);
@@ -89,7 +89,7 @@ fn assert_same(shape: &Shape) {
 }
 
 #[test]
-fn cylinders_by_area_and_by_directions() {
+fn cylinder_area_and_direction_sampling_agree() {
     for caps in [true, false] {
         for (a, b, radius) in [
             (v(-1.0, 1.0, 0.2), v(1.2, 1.4, -0.1), 0.4),
@@ -103,7 +103,7 @@ fn cylinders_by_area_and_by_directions() {
 }
 
 #[test]
-fn cones_by_area_and_by_directions() {
+fn cone_area_and_direction_sampling_agree() {
     for cap in [true, false] {
         for (base, tip, radius) in [
             (v(0.3, 2.0, 0.1), v(-0.1, 0.6, 0.2), 0.7),
@@ -118,8 +118,8 @@ fn cones_by_area_and_by_directions() {
 }
 
 #[test]
-fn tori_by_area_and_by_directions() {
-    // Seen through the hole, from beside, and edge on, where a torus hides parts of itself.
+fn torus_area_and_direction_sampling_agree() {
+    // Seen through the hole, from the side, and edge on, where a torus occludes itself.
     for (center, axis, radius, tube) in [
         (v(0.0, 1.2, 0.0), DVec3::Y, 0.8, 0.3),
         (v(0.7, 1.0, 0.4), v(1.0, 0.3, 0.2), 0.6, 0.35),
@@ -131,9 +131,9 @@ fn tori_by_area_and_by_directions() {
 }
 
 #[test]
-fn far_away_the_middle_gives_what_the_shape_shows() {
-    // E = L·A·cos θ/d² of the shadow that the body casts along the line of sight: 2Rh for a cylinder across it, πR² for
-    // one along it; a cone from beside shows the triangle R·h, from behind its tip the base.
+fn distant_light_acts_like_its_center() {
+    // E = L·A·cos θ/d² of the silhouette along the line of sight: 2Rh for a cylinder across it, πR² along it; a cone
+    // from the side has the triangle R·h, from behind its tip the base.
     let far = |center: DVec3, shape: Shape, shown: f64| {
         let exact = shown * center.normalize().y / center.length_squared();
         let soft = lit(&shape).shadows(Shadows::Soft, 64).values(256, 16);
@@ -148,7 +148,7 @@ fn far_away_the_middle_gives_what_the_shape_shows() {
         Shape::Cylinder { a: up - v(0.5, 1.0, 0.0), b: up + v(0.5, 1.0, 0.0), radius: 0.5, caps: false };
     far(up, open, 2.0 * 0.5 * 1.0);
     let cone = |axis: DVec3| {
-        // Its centre of area is on the line of sight.
+        // Its centroid is on the line of sight.
         let (side, cap) = (0.5 * axis.length().hypot(0.5), 0.25);
         let from_base = axis * (side / 3.0 / (side + cap));
         Shape::Cone { base: up - from_base, tip: up - from_base + axis, radius: 0.5, cap: true }

@@ -1,4 +1,4 @@
-//! Vertices in rows and vertices one by one: the same bits.
+//! Vertices in packets and single vertices: the same bits.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use glimt::scene::description::{ColorSource, Material, MaterialKind, Shadows, Sh
 use super::scenes::{Build, emitter, glass, mirror, plain, scene};
 use super::v;
 
-/// One of each shape between mirrors and glass, under lamps; `paint` makes the colour of what is Phong.
+/// One of each shape between mirrors and glass, under lights; `paint` sets the color of the Phong materials.
 fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
     let mut build = scene();
     let phong = |build: &mut Build, r: f32, ks: f32| -> Material {
@@ -43,7 +43,7 @@ fn pictured(paint: impl Fn(&mut Build, Vec3) -> ColorSource) -> Build {
 }
 
 #[test]
-fn a_texture_of_one_colour_is_that_colour_to_the_bit() {
+fn constant_texture_equals_its_color_bit_for_bit() {
     let by_rows = pictured(|_, color| ColorSource::Constant(color));
     let one_by_one = pictured(|build, color| {
         ColorSource::Texture(build.texture(&[&[color]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE))
@@ -57,7 +57,7 @@ fn a_texture_of_one_colour_is_that_colour_to_the_bit() {
 }
 
 #[test]
-fn a_sample_has_its_bits_however_the_work_is_cut() {
+fn sample_bits_do_not_depend_on_the_tiling() {
     let build = pictured(|_, color| ColorSource::Constant(color)).shadows(Shadows::Soft, 2);
     let (world, settings) = (build.world(), build.settings(4));
     let samples = |rect: Rect, samples: Range<u32>| {

@@ -23,7 +23,7 @@ use glimt::world::{
 
 use super::v;
 
-/// A scene under construction, with settings of its pictures.
+/// A scene under construction, with render settings.
 #[derive(Clone)]
 pub struct Build {
     pub scene: Scene,
@@ -68,7 +68,7 @@ pub fn scene() -> Build {
     Build { scene, parts: WorldInputs::default(), view: View::Beauty, texels: Vec::new(), sky: None }
 }
 
-/// An angle of view in which a pixel is a point.
+/// A field of view in which a pixel is a point.
 const NARROW: f64 = 1e-6;
 
 fn look_at(position: DVec3, look_at: DVec3, fov: f64) -> Camera {
@@ -111,7 +111,7 @@ impl Build {
         self.with(|scene| scene.render.max_depth = max_depth)
     }
 
-    /// Turns photons on: so many in a pass, gathered within this radius in the first pass.
+    /// Enables photons: `count` per pass, gathered within `radius` in the first pass.
     pub fn photons(self, count: u64, radius: f64) -> Self {
         self.with(|scene| scene.photons = Photons { enabled: true, count, radius, bounces: 10_000 })
     }
@@ -156,7 +156,7 @@ impl Build {
     /// Adds an instance of a mesh that was read from a file.
     pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
-            .expect("nobody cancels");
+            .expect("not cancelled");
         self.parts.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let [scale, rotate, translate] = placed;
@@ -174,18 +174,17 @@ impl Build {
         })
     }
 
-    /// An instance of a mesh file with materials of its own, without smoothing.
+    /// An instance of a mesh file with its own materials, without smoothing.
     pub fn own_mesh(self, mesh: TriangleMesh, materials: Vec<FileMaterial>) -> Self {
         let mut build = self.mesh(mesh, AS_IT_IS, matte(0.5));
         let file = build.parts.meshes.len() - 1;
         let loaded = LoadedMesh { materials, ..build.parts.meshes[file].loaded().clone() };
-        let tree =
-            MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+        let tree = MeshTree::build(Arc::new(loaded), Accel::Bvh, &CancelToken::new()).expect("not cancelled");
         build.parts.meshes[file] = Arc::new(tree);
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
     }
 
-    /// Adds a texture by rows from the top; returns its number.
+    /// Adds a texture, rows from the top; returns its index.
     pub fn texture(&mut self, rows: &[&[Vec3]], filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> usize {
         let number = self.texels.len();
         self.texels.push(Arc::new(Texels {
@@ -210,13 +209,13 @@ impl Build {
         number
     }
 
-    /// Adds an environment of one radiance.
+    /// Adds an environment of constant radiance.
     pub fn environment(self, radiance: f32) -> Self {
         let color = Vec3::splat(radiance);
         self.with(|scene| scene.environment = Some(Environment { color, file: None, rotate: 0.0 }))
     }
 
-    /// Adds an equirectangular environment map of so many columns, rows from the top.
+    /// Adds an equirectangular environment map with `width` columns, rows from the top.
     pub fn sky(mut self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
@@ -231,16 +230,16 @@ impl Build {
                 Some(number) => &self.texels[number],
                 None => self.sky.as_ref().expect("a map of the environment"),
             };
-            let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("nobody cancels"));
+            let levels = || Arc::new(mipmaps(texels, &CancelToken::new()).expect("not cancelled"));
             let image = Image { texels: Arc::clone(texels), mipmaps: needed.has_mipmaps.then(levels) };
             parts.images.insert(needed.source, image);
         }
         let origin = origin(&self.scene.camera, None);
         let geometry = Geometry::of_scene(&self.scene, &parts.meshes, origin, &CancelToken::new());
-        let geometry = Arc::new(geometry.expect("nobody cancels"));
+        let geometry = Arc::new(geometry.expect("not cancelled"));
         let sky = self.sky.as_ref().and_then(sky);
         let lights =
-            lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new()).expect("nobody cancels");
+            lights(&self.scene, &geometry, &parts.images, sky, &CancelToken::new()).expect("not cancelled");
         World::new(&self.scene, &parts, geometry, lights)
     }
 
@@ -251,23 +250,23 @@ impl Build {
         RenderSettings { render, dof: true, view: self.view, photons: enabled.then_some(photons) }
     }
 
-    /// The whole picture, means of the samples.
+    /// The whole image, as means of the samples.
     pub fn picture(&self, samples: u32, seed: u32) -> Vec<DVec3> {
         let (width, height) = (self.scene.render.width, self.scene.render.height);
         tile(&self.world(), &self.settings(seed), Rect { x: 0, y: 0, width, height }, samples)
     }
 
-    /// The only pixel, by one sample.
+    /// The only pixel, with one sample.
     pub fn color(&self) -> DVec3 {
         self.picture(1, 0)[0]
     }
 
-    /// The only pixel of a grey picture, by one sample.
+    /// The only pixel of a gray image, with one sample.
     pub fn value(&self) -> f64 {
         self.color().x
     }
 
-    /// The only pixel by each of many seeds.
+    /// The only pixel for each of many seeds.
     pub fn values(&self, samples: u32, seeds: u32) -> Vec<f64> {
         let world = self.world();
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
@@ -280,13 +279,13 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
     tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
 }
 
-/// The photon maps of so many samples. `None` if no photons are gathered.
+/// The photon maps after `samples` samples. `None` if no photons are gathered.
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
     settings.effective().photons.filter(|_| settings.gathers()).map(|of_photons| {
         let photons = integrators::Photons::new(world, settings, of_photons, &ignore_progress, &token);
-        let (photons, _) = photons.expect("nobody cancels");
-        photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
+        let (photons, _) = photons.expect("not cancelled");
+        photons.maps(world, settings, 0..samples, &token).expect("not cancelled")
     })
 }
 
@@ -300,7 +299,7 @@ pub fn tile_by(
 ) -> Vec<DVec3> {
     let token = CancelToken::new();
     let (tile, _) =
-        render_tile_with_photons(maps, world, settings, rect, 0..samples, &token).expect("nobody cancels");
+        render_tile_with_photons(maps, world, settings, rect, 0..samples, &token).expect("not cancelled");
     let sums = tile.radiance.chunks(samples as usize);
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }
@@ -336,7 +335,7 @@ pub fn mirror(reflectance: f32) -> Material {
     plain(MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(reflectance)) })
 }
 
-/// Metal of a grey reflectance at normal incidence.
+/// Metal with a gray reflectance at normal incidence.
 pub fn metal(reflectance: f32, roughness: f32, anisotropy: f32) -> Material {
     plain(MaterialKind::Metal {
         fresnel: FresnelSource::Schlick(ColorSource::Constant(Vec3::splat(reflectance))),
@@ -345,7 +344,7 @@ pub fn metal(reflectance: f32, roughness: f32, anisotropy: f32) -> Material {
     })
 }
 
-/// Plastic of an index of refraction of 1.5 under a full coat.
+/// Plastic with an index of refraction of 1.5 under a full coat.
 pub fn plastic(diffuse: f32, roughness: f32) -> Material {
     plain(MaterialKind::Plastic {
         diffuse: ColorSource::Constant(Vec3::splat(diffuse)),
@@ -381,7 +380,7 @@ pub fn frosted(ior: f32, roughness: f32) -> Material {
     plain(MaterialKind::Glass { ior, tint: DVec3::ONE, roughness })
 }
 
-/// A principled material under a clear coat, which transmits this part of the light.
+/// A principled material under a clear coat, which transmits this fraction of the light.
 pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
     let mut material = principled(color, 0.0, roughness);
     if let MaterialKind::Principled { transmission: own, .. } = &mut material.kind {
@@ -390,12 +389,12 @@ pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
     material
 }
 
-/// Glass of this transmittance per unit of length.
+/// Glass with this transmittance per unit of length.
 pub fn tinted(ior: f32, tint: DVec3) -> Material {
     plain(MaterialKind::Glass { ior, tint, roughness: NumberSource::Constant(0.0) })
 }
 
-/// A material of a mesh file by its illumination model: 2 is matte grey, 9 glass.
+/// A material of a mesh file by its illumination model: 2 is matte gray, 9 glass.
 pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
     FileMaterial {
         name: String::new(),
@@ -416,7 +415,7 @@ pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
     }
 }
 
-/// A receiver of reflectance ρ around a point, facing up, seen from close by: nothing comes between.
+/// A receiver of reflectance ρ around a point, facing up, seen from so close that nothing comes between.
 pub fn receiver(at: DVec3, reflectance: f32) -> Build {
     let half = 0.125;
     let corner = at + v(-half, 0.0, half);
@@ -460,5 +459,5 @@ pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> Tr
     mesh
 }
 
-/// Placement that leaves a mesh as it is.
+/// The identity transform.
 pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];

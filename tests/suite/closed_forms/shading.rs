@@ -1,4 +1,4 @@
-//! The Phong material, its parts as views, and textures.
+//! The Phong material, its components as views, and textures.
 
 use std::f64::consts::PI;
 
@@ -14,8 +14,8 @@ use glimt::scene::description::{
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{assert_close, v};
 
-/// A square of a material at the origin, facing up, under a light of E = 3·cos 20° from 20° beside the normal, seen from
-/// `degrees` beside the normal on the other side.
+/// A square of a material at the origin, facing up, under a light of E = 3·cos 20° from 20° off the normal, seen from
+/// `degrees` off the normal on the other side.
 fn lobe(kind: Material, degrees: f64) -> Build {
     let at = |degrees: f64| v(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
     scene()
@@ -25,8 +25,8 @@ fn lobe(kind: Material, degrees: f64) -> Build {
 }
 
 #[test]
-fn the_normalised_lobe() {
-    // f = kd/π + ks·(α + 2)/2π·cosᵅ of the angle between the eye and the mirrored light, which is at 20°.
+fn phong_lobe_is_normalized() {
+    // f = kd/π + ks·(α + 2)/2π·cosᵅ of the angle between the camera and the mirrored light, which is at 20°.
     for (kd, ks, alpha, degrees) in
         [(0.0, 1.0, 50.0, 30.0), (0.3, 0.5, 10.0, 45.0), (0.2, 0.8, 100.0, 21.0), (0.4, 0.6, 0.0, -50.0)]
     {
@@ -45,8 +45,8 @@ fn the_normalised_lobe() {
 }
 
 #[test]
-fn the_parts_add_up_to_the_picture() {
-    // Lₐ = ka·Isa; the picture at depth 0 is the emission alone.
+fn components_add_up_to_the_beauty() {
+    // Lₐ = ka·Isa; at depth 0 the image is only the emission.
     let mut kind = phong(0.3, 0.5, 20.0, 0.25);
     if let MaterialKind::Phong { ambient, .. } = &mut kind.kind {
         *ambient = Some(ColorSource::Constant(Vec3::splat(0.6)));
@@ -65,13 +65,13 @@ fn the_parts_add_up_to_the_picture() {
     );
     assert_close("emitted", emitted, 0.25);
     assert_close("the picture", view(View::Beauty), parts.iter().sum::<f64>() + emitted);
-    // From behind there is neither light nor emission, but ambient light.
+    // From behind there is neither light nor emission, only ambient light.
     let behind = lit.seen(v(0.5, -2.0, 0.3), DVec3::ZERO);
     assert_close("from behind", behind.value(), 0.12);
 }
 
 #[test]
-fn ambient_light_defaults_to_the_diffuse_colour() {
+fn ambient_light_defaults_to_the_diffuse_color() {
     let dark = scene()
         .sphere(v(0.0, 0.0, -5.0), 1.0, phong(0.35, 0.1, 3.0, 0.0))
         .with(|scene| scene.render.ambient = Vec3::new(0.5, 1.0, 2.0));
@@ -82,7 +82,7 @@ fn ambient_light_defaults_to_the_diffuse_colour() {
 }
 
 #[test]
-fn emission_is_seen_from_the_front_only_and_at_any_depth() {
+fn emission_is_one_sided_at_any_depth() {
     let square = |from| {
         scene()
             .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), emitter(3.0))
@@ -100,9 +100,7 @@ const GREEN: Vec3 = Vec3::new(0.0, 1.0, 0.0);
 const BLUE: Vec3 = Vec3::new(0.0, 0.0, 1.0);
 const GREY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
 
-/// Whose diffuse colour, by ambient light 1, is the picture
-/// red green
-/// blue grey.
+/// A material whose diffuse color, under ambient light 1, is the image red green blue gray.
 fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
     let texture = build.texture(&[&[RED, GREEN], &[BLUE, GREY]], filter, wrap, repeat);
@@ -114,7 +112,7 @@ fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material
 }
 
 #[test]
-fn a_picture_on_a_quad_stands_on_its_v_axis() {
+fn texture_on_a_quad_is_upright_along_v() {
     let at = |filter, wrap, repeat, (s, t): (f64, f64)| {
         let (build, kind) = pictured(filter, wrap, repeat);
         let (corner, u, w) = (v(-1.0, -2.0, -5.0), v(3.0, 0.5, 0.0), v(-0.5, 4.0, 1.0));
@@ -134,7 +132,7 @@ fn a_picture_on_a_quad_stands_on_its_v_axis() {
     let place = (0.52, 0.85);
     assert_eq!(at(TextureFilter::Nearest, Wrap::Mirror, Vec2::new(3.0, 2.0), place), BLUE);
     assert_eq!(at(TextureFilter::Nearest, Wrap::Clamp, Vec2::new(3.0, 2.0), place), GREEN);
-    // Bilinear in the middle is the mean of all; at a texel's centre the texel.
+    // Bilinear in the middle is the mean of all texels; at a texel's center, the texel.
     let smooth = |place| at(TextureFilter::Bilinear, Wrap::Clamp, Vec2::ONE, place);
     let mean = (RED + GREEN + BLUE + GREY) / 4.0;
     assert!((smooth((0.5, 0.5)) - mean).length() < 1e-5);
@@ -143,8 +141,8 @@ fn a_picture_on_a_quad_stands_on_its_v_axis() {
 }
 
 #[test]
-fn the_border_belongs_to_the_row_and_column_that_begin_there() {
-    // u = 0 is in the left column, v = 0 in the bottom row: texels are half-open intervals from 0 on.
+fn texel_borders_belong_to_the_next_texel() {
+    // u = 0 is in the left column, v = 0 in the bottom row: texels are half-open intervals starting at 0.
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
@@ -154,7 +152,7 @@ fn the_border_belongs_to_the_row_and_column_that_begin_there() {
 }
 
 #[test]
-fn a_sphere_s_coordinates() {
+fn sphere_texture_coordinates() {
     // u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π: (1, 1, 1)/√3 is at (.625, .6959133).
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let center = v(3.0, -1.0, 2.0);
@@ -179,11 +177,11 @@ fn a_sphere_s_coordinates() {
     assert_close("v", known.y, 0.695_913_3);
 }
 
-/// Checks that a coarse smooth ball is lit like the ball that it approximates, up to 4° before the edge of the light,
-/// where facets are turned away by up to half of their 11.25°. No facet is black, none deviates from the cosine by more
-/// than a third, the margin for vertex normals, which are means of the facets around.
+/// Checks that a coarse smooth ball is lit like the sphere it approximates, up to 4° before the terminator, where
+/// facets are turned away by up to half of their 11.25°. No facet is black, none deviates from the cosine by more than
+/// a third, the margin for vertex normals, which average the surrounding facets.
 #[test]
-fn facets_do_not_show_at_the_edge_of_the_light() {
+fn facets_do_not_show_at_the_terminator() {
     for shadows in [Shadows::Hard, Shadows::Off] {
         let mut seen = 0;
         for place in 0..2000 {
@@ -201,7 +199,7 @@ fn facets_do_not_show_at_the_edge_of_the_light() {
                 )
                 .with(|scene| match &mut scene.objects[0].shape {
                     Shape::Mesh(Mesh { smooth, .. }) => *smooth = true,
-                    other => panic!("{other:?} is no mesh"),
+                    other => panic!("{other:?} is not a mesh"),
                 })
                 .point_light(DVec3::X * 1e4, 1.0, Falloff::None)
                 .shadows(shadows, 1)
@@ -216,7 +214,7 @@ fn facets_do_not_show_at_the_edge_of_the_light() {
 }
 
 #[test]
-fn the_parts_of_every_pixel_add_up_through_mirrors_and_glass_too() {
+fn components_add_up_through_mirrors_and_glass() {
     let build = scene()
         .quad(v(-5.0, -1.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -20.0), phong(0.5, 0.4, 20.0, 0.0))
         .sphere(v(-1.2, 0.0, -6.0), 1.0, mirror(0.9))
@@ -238,9 +236,9 @@ fn the_parts_of_every_pixel_add_up_through_mirrors_and_glass_too() {
         assert!(off <= 1e-5 * beauty.max_element().max(1.0), "{pixel}: {sum} {beauty}");
     }
     for (part, name) in parts.iter().zip(["ambient", "diffuse", "specular", "emission"]) {
-        assert!(part.iter().any(|color| color.max_element() > 0.01), "{name} has something to show");
+        assert!(part.iter().any(|color| color.max_element() > 0.01), "{name} has light");
     }
-    // Through the mirror and the glass, too, each is what it is there.
+    // Seen through the mirror and the glass, each component keeps its meaning.
     let through = |at: DVec3, name: &str| {
         let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
         build.clone().seen(v(0.0, 1.0, 1.0), at).viewed(view).value()

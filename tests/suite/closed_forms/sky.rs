@@ -19,7 +19,7 @@ fn both(build: &Build) -> [Build; 2] {
     [build.clone(), path(build.clone())]
 }
 
-/// A grey map by a function of column and row.
+/// A gray map as a function of column and row.
 fn map(width: u32, height: u32, radiance: impl Fn(u32, u32) -> f32) -> (u32, Vec<Vec3>) {
     let texel = |row| (0..width).map(move |column| (column, row));
     (width, (0..height).flat_map(texel).map(|(column, row)| Vec3::splat(radiance(column, row))).collect())
@@ -30,7 +30,7 @@ fn lit(build: Build, (width, texels): (u32, Vec<Vec3>), rotate: f64) -> Build {
 }
 
 #[test]
-fn under_a_constant_sky_a_plane_has_its_albedo() {
+fn plane_under_a_constant_sky_has_its_albedo() {
     for shadows in [Shadows::Soft, Shadows::Hard, Shadows::Off] {
         for build in both(&at_origin().environment(1.0).shadows(shadows, 1)) {
             assert_mean(&format!("{shadows:?}"), &build.values(64, 64), 0.7);
@@ -38,7 +38,7 @@ fn under_a_constant_sky_a_plane_has_its_albedo() {
         let white = lit(at_origin(), map(16, 8, |_, _| 1.0), 0.0).shadows(shadows, 4);
         assert_mean("as a map", &white.values(64, 64), 0.7);
     }
-    // Half of it behind a wall that stands on the edge of the receiver's point; `hard` is soft as well, `off` sees no wall.
+    // Half of it is behind a wall on the edge of the receiver's point; `hard` is soft as well, `off` ignores the wall.
     let wall = |shadows| {
         at_origin()
             .environment(1.0)
@@ -58,7 +58,7 @@ fn half_a_sky_gives_half_or_all_of_the_light() {
     let lower = map(rows, height, |_, row| f32::from(u8::from(row >= height / 2)));
     // u < ½ is seen towards −x.
     let left = map(rows, height, |column, _| f32::from(u8::from(column < rows / 2)));
-    // Between rows 31 and 32 the radiance falls from 1 to 0 over a texel: what is lost above the horizon is small.
+    // Between rows 31 and 32 the radiance falls from 1 to 0 within a texel: little is lost above the horizon.
     for build in both(&lit(at_origin(), upper, 0.0)) {
         let values = build.values(64, 64);
         let lost = PI / f64::from(height);
@@ -72,7 +72,7 @@ fn half_a_sky_gives_half_or_all_of_the_light() {
     for build in both(&lit(at_origin(), left.clone(), 0.0)) {
         assert_mean("left", &build.values(64, 64), 0.35);
     }
-    // A wall in the dark half takes nothing, one in the bright half takes all.
+    // A wall in the dark half blocks nothing, one in the bright half blocks everything.
     let wall = |x: f64, rotate: f64| {
         let build = at_origin().quad(v(x, 0.0, -1e5), v(0.0, 1e5, 0.0), v(0.0, 0.0, 2e5), matte(0.0));
         let values = lit(build, left.clone(), rotate).values(64, 64);
@@ -85,20 +85,21 @@ fn half_a_sky_gives_half_or_all_of_the_light() {
 }
 
 #[test]
-fn a_bright_texel_is_seen_where_the_contract_has_it() {
-    // In maps of 8 × 5 the middles of columns 1, 3, 5, 7 are halfway between the axes; of 4 × 3, columns 0 … 3 are seen at
-    // u = ⅛, ⅜, ⅝, ⅞: turned by 45° they lie on −z and so on.
+fn bright_texel_appears_in_its_direction() {
+    // In maps of 8 × 5, the centers of columns 1, 3, 5, 7 are halfway between the axes; in maps of 4 × 3, columns 0 … 3
+    // are centered at u = ⅛, ⅜, ⅝, ⅞: rotated by 45° they are on −z and so on.
     let sees = |direction: DVec3, map: (u32, Vec<Vec3>), rotate: f64| {
         lit(scene().seen(DVec3::ZERO, direction), map, rotate).value()
     };
     let one = |column: u32, row: u32| map(4, 3, move |x, y| f32::from(u8::from((x, y) == (column, row))));
-    // Columns at azimuths −135°, −45°, 45°, 135° from −z towards +x; counterclockwise by 45° they are at −180°, −90°, 0°, 90°.
+    // Columns at azimuths −135°, −45°, 45°, 135° from −z towards +x; rotated counterclockwise by 45° they are at −180°,
+    // −90°, 0°, 90°.
     let around = [DVec3::Z, DVec3::NEG_X, DVec3::NEG_Z, DVec3::X];
     for (column, direction) in (0..4).zip(around) {
         let sees_it = sees(direction, one(column, 1), 45.0);
         assert!((sees_it - 1.0).abs() < 1e-5, "{direction}: {sees_it}");
         assert!(sees(-direction, one(column, 1), 45.0) < 1e-5);
-        // A quarter more brings what was at +x to −z.
+        // Another quarter turn moves +x to −z.
         let turned = DVec3::new(direction.z, 0.0, -direction.x);
         assert!((sees(turned, one(column, 1), 135.0) - 1.0).abs() < 1e-5, "{turned}");
         assert!((sees(turned, one(column, 1), -225.0) - 1.0).abs() < 1e-5, "{turned}");
@@ -108,7 +109,7 @@ fn a_bright_texel_is_seen_where_the_contract_has_it() {
         assert_eq!((sees(DVec3::Y, row(0), rotate), sees(DVec3::Y, row(2), rotate)), (1.0, 0.0));
         assert_eq!((sees(DVec3::NEG_Y, row(2), rotate), sees(DVec3::NEG_Y, row(0), rotate)), (1.0, 0.0));
     }
-    // Unturned: between columns 1 and 2 it is −z, right of the middle is +x.
+    // Not rotated: −z is between columns 1 and 2, +x is right of the middle.
     let right = |rotate| {
         [DVec3::NEG_Z, DVec3::X, DVec3::Z, DVec3::NEG_X]
             .map(|direction| sees(direction, map(4, 1, |x, _| [0.0, 1.0, 2.0, 4.0][x as usize]), rotate))
@@ -121,7 +122,7 @@ fn a_bright_texel_is_seen_where_the_contract_has_it() {
 }
 
 #[test]
-fn mirrors_and_glass_see_it_and_it_counts_to_emission() {
+fn mirrors_and_glass_show_the_sky_as_emission() {
     let pane = |material| {
         scene().quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), material).environment(2.0)
     };
@@ -131,15 +132,15 @@ fn mirrors_and_glass_see_it_and_it_counts_to_emission() {
         assert_eq!(build.depth(0).value(), 0.0);
     }
     assert_close("by itself", scene().environment(2.0).depth(0).value(), 2.0);
-    // What glass does not reflect it lets through: nothing is lost.
+    // Glass transmits whatever it does not reflect: nothing is lost.
     let ball = scene().sphere(v(0.3, 0.2, -3.0), 1.0, glass(1.5)).environment(2.0).depth(40);
     assert!((ball.value() - 2.0).abs() < 2e-2, "{}", ball.value());
     assert_mean("glass by paths", &path(ball).values(64, 16), 2.0);
 }
 
 #[test]
-fn a_phong_ball_in_a_furnace_reflects_what_its_lobe_holds() {
-    // Albedos of ks = 1 at 60°: 0.5047 (α = 10), 0.5000 (α = 100); looked at along −z, the normal is 60° from z.
+fn phong_ball_in_a_furnace_has_its_albedo() {
+    // Albedos of ks = 1 at 60°: 0.5047 (α = 10), 0.5000 (α = 100); seen along −z, the normal is 60° from z.
     for (shininess, albedo) in [(10.0, 0.5047), (100.0, 0.5000)] {
         let normal = v(60.0_f64.to_radians().sin(), 0.0, 60.0_f64.to_radians().cos());
         let center = v(0.0, 0.0, -5.0) - normal;
@@ -162,7 +163,7 @@ fn a_phong_ball_in_a_furnace_reflects_what_its_lobe_holds() {
     }
 }
 
-/// Solid angle of what a texel between rows gives: ∫ of its tent.
+/// Solid angle of a texel between rows: ∫ of its tent function.
 fn weight_of(width: u32, height: u32, row: u32) -> f64 {
     let (steps, texel) = (4096, PI / f64::from(height));
     let tent = |step: i32| {
@@ -193,13 +194,13 @@ fn one_bright_texel_is_a_sun() {
         assert!((mean / exact - 1.0).abs() < 2e-3, "{mean} {exact}");
     }
     assert_eq!(lit(blocked(to_light * 40.0), sky.clone(), 0.0).value(), 0.0);
-    // Turned about +y by 90° it shines from elsewhere.
+    // Rotated by 90° about +y, it shines from elsewhere.
     let turned = DVec3::new(to_light.z, to_light.y, -to_light.x);
     assert_eq!(lit(blocked(turned * 40.0), sky.clone(), 90.0).value(), 0.0);
     assert!(lit(blocked(to_light * 40.0), sky, 90.0).value() > 0.0);
 }
 
-/// Points of a floor with balls on it, each with its normal up; blocks of the picture of two renders.
+/// Points of a floor with balls on it, each with its normal up; blocks of two rendered images.
 fn courtyard() -> Build {
     let mut build = scene().quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), matte(0.7));
     for (x, z, radius) in [(-1.5, 0.0, 0.8), (1.0, -1.0, 1.2), (0.5, 1.6, 0.4)] {
@@ -208,8 +209,8 @@ fn courtyard() -> Build {
     build.pictured(v(0.0, 4.0, 6.0), v(0.0, 0.4, 0.0), 45.0, 48, 32).depth(1)
 }
 
-/// z of the difference of two estimates of the mean of blocks of 16 × 16 pixels, and of the whole picture, by the spread over
-/// seeds of both.
+/// The z-score of the difference between two estimates of the mean of blocks of 16 × 16 pixels, and of the whole image,
+/// from the spread of both over seeds.
 fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]: [u32; 2], seeds: u32) {
     let (width, height) = (48_usize, 32_usize);
     let blocks = |build: &Build, samples| -> Vec<Vec<f64>> {
@@ -236,14 +237,14 @@ fn assert_same_picture(what: &str, one: &Build, other: &Build, [samples, others]
         };
         let ((a, var_a), (b, var_b)) = (moments(&one), moments(&other));
         let error = (var_a + var_b).sqrt();
-        // Without a bound on the error noise would pass.
+        // Without a bound on the standard error, noise would pass.
         assert!(error < 0.01 * b, "{what}, block {block}: {a} {b} ± {error}");
         assert!((a - b).abs() < 4.89 * error.max(1e-4 * b), "{what}, block {block}: {a} {b} ± {error}");
     }
 }
 
 #[test]
-fn whitted_and_path_agree_on_direct_light_of_skies() {
+fn whitted_and_path_agree_on_sky_light() {
     let hills = map(64, 32, |x, y| {
         let sun = if (x, y) == (40, 7) { 500.0 } else { 0.0 };
         sun + f32::from(u8::from(y < 16)) * (0.2 + 0.02 * (x % 7) as f32)
@@ -254,7 +255,7 @@ fn whitted_and_path_agree_on_direct_light_of_skies() {
     }
 }
 
-/// A map that is black but for some texels of one brightness, and the same light from as many directions.
+/// A black map with a few texels of equal brightness, and the same light as directional lights.
 fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
     let mut bright = std::collections::BTreeSet::new();
     let mut state = 12_345_u64;
@@ -278,23 +279,24 @@ fn dotted(width: u32, height: u32, count: u32) -> [Build; 2] {
 }
 
 #[test]
-fn bright_texels_are_as_many_suns() {
+fn bright_texels_act_like_suns() {
     let [map, suns] = dotted(512, 256, 40);
     assert_same_picture("40 of 512 × 256", &map, &suns, [64, 4], 16);
-    assert_same_picture("the same by paths", &path(map), &suns, [64, 4], 16);
+    assert_same_picture("the same with path", &path(map), &suns, [64, 4], 16);
 }
 
-/// Ten seconds of a processor: `cargo test --release --test suite a_thousand_texels -- --ignored`.
+/// Ignored by default: ten seconds of processor time,
+/// `cargo test --release --test suite a_thousand_texels -- --ignored`.
 #[test]
 #[ignore = "ten seconds: cargo test --release --test suite a_thousand_texels -- --ignored"]
-fn a_thousand_texels_of_a_large_map_are_a_thousand_suns() {
+fn a_thousand_texels_act_like_suns() {
     let [map, suns] = dotted(4096, 2048, 1000);
     assert_same_picture("1000 of 4096 × 2048", &map, &suns, [64, 1], 16);
-    assert_same_picture("the same by paths", &path(map), &suns, [64, 1], 16);
+    assert_same_picture("the same with path", &path(map), &suns, [64, 1], 16);
 }
 
 #[test]
-fn a_map_of_one_texel_is_a_colour() {
+fn single_texel_map_is_a_constant_color() {
     for build in both(&lit(receiver(DVec3::ZERO, 0.5), (1, vec![Vec3::new(1.0, 2.0, 4.0)]), 10.0)) {
         let colors: Vec<DVec3> = (0..64).map(|seed| build.picture(64, seed)[0]).collect();
         for (axis, expected) in [0.5, 1.0, 2.0].into_iter().enumerate() {

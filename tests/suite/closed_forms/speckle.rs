@@ -1,4 +1,4 @@
-//! Cubes from many sides: no ray inside the silhouette misses, and every one sees a front.
+//! Cubes from many sides: no ray inside the silhouette misses, and every ray hits a front.
 
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -20,7 +20,7 @@ fn boxes() -> Build {
     scene().cuboid(DVec3::ZERO, DVec3::splat(2.0), DVec3::ZERO, matte(0.5))
 }
 
-/// 27 boxes that touch; their outside is the same cube.
+/// 27 touching boxes whose outside is the same cube.
 fn grid() -> Build {
     let third = 2.0 / 3.0;
     (0..27).fold(scene(), |build, i| {
@@ -52,7 +52,7 @@ fn triangles() -> Build {
     })
 }
 
-/// Every face as 8 × 8 squares: the planes of a tree go through their edges.
+/// Every face as 8 × 8 squares: splitting planes pass through their edges.
 fn mesh(accel: Accel) -> Build {
     let mut mesh = TriangleMesh::default();
     for [c, u, w] in faces() {
@@ -73,8 +73,8 @@ fn cubes_do_not_speckle() {
         ("grid", grid()),
         ("quads", quads()),
         ("triangles", triangles()),
-        ("mesh under a tree of boxes", mesh(Accel::Bvh)),
-        ("mesh under a tree of planes", mesh(Accel::KdTree)),
+        ("mesh in a bvh", mesh(Accel::Bvh)),
+        ("mesh in a kd-tree", mesh(Accel::KdTree)),
     ] {
         let mut random = Random(7);
         let geometry = build.world().geometry;
@@ -82,7 +82,7 @@ fn cubes_do_not_speckle() {
         for _ in 0..1000 {
             let eye = random.direction() * 6.0;
             for _ in 0..50 {
-                // A third of the rays at an edge, where pieces meet.
+                // A third of the rays aim at an edge where pieces meet.
                 let mut target = v(random.signed(), random.signed(), random.signed());
                 if random.unit() < 0.3 {
                     target.x = if target.x < 0.0 { -1.0 / 3.0 } else { 1.0 };
@@ -95,7 +95,7 @@ fn cubes_do_not_speckle() {
                 }
                 inside += 1;
                 let Some(hit) = geometry.closest(&ray) else { panic!("{what}: a hole in {ray:?}") };
-                let exact = entry(&ray, 1.0).expect("the larger cube holds the smaller one");
+                let exact = entry(&ray, 1.0).expect("the larger cube contains the smaller one");
                 assert!((f64::from(hit.shape.t) / exact - 1.0).abs() < 1e-5, "{what}: {ray:?}");
                 let surface = geometry.surface(&ray, &hit);
                 assert!(surface.normal.dot(ray.direction) < 0.0, "{what}: a back in {ray:?}");

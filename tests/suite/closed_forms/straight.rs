@@ -1,4 +1,4 @@
-//! Light that goes straight on: thin panes, and what opacity lets through.
+//! Light that passes straight through: thin panes and partial opacity.
 
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ fn path(build: Build) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path)
 }
 
-/// Reflectance of a pane of n = 1.5: 2R/(1 + R), R by Fresnel's sine and tangent laws.
+/// Reflectance of a pane with n = 1.5: 2R/(1 + R), with R from Fresnel's sine and tangent laws.
 fn reflectance(i: f64) -> f64 {
     let t = (i.sin() / 1.5).asin();
     let r = if i == 0.0 {
@@ -38,19 +38,19 @@ fn reflectance(i: f64) -> f64 {
     2.0 * r / (1.0 + r)
 }
 
-/// A large square that a ray down −z meets at a depth, turned about x.
+/// A large square that a ray along −z hits at a given depth, rotated about x.
 fn sheet(build: Build, z: f64, degrees: f64, material: Material) -> Build {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let (u, w) = (v(2e3, 0.0, 0.0), v(0.0, cos, sin) * 2e3);
     build.quad(v(0.0, 0.0, z) - (u + w) * 0.5, u, w, material)
 }
 
-/// A lamp that fills what is behind.
+/// A light that fills the view behind.
 fn lamp_at(build: Build, z: f64) -> Build {
     sheet(build, z, 0.0, emitter(1.0))
 }
 
-/// Means that agree within their errors.
+/// Checks that means agree within their errors.
 #[track_caller]
 fn assert_same(what: &str, a: &[f64], b: &[f64]) {
     let [a, b] = [mean_and_error(a), mean_and_error(b)];
@@ -58,10 +58,10 @@ fn assert_same(what: &str, a: &[f64], b: &[f64]) {
 }
 
 #[test]
-fn a_pane_before_a_lamp_by_angle() {
+fn pane_transmits_by_angle() {
     for degrees in [0.0_f64, 30.0, 60.0, 80.0] {
         let exact = 0.9 * (1.0 - reflectance(degrees.to_radians()));
-        // What the pane reflects passes beside the lamp.
+        // The pane's reflection misses the light.
         let lamp = [v(-10.0, -10.0, -2e3), v(20.0, 0.0, 0.0), v(0.0, 20.0, 0.0)];
         let build = sheet(scene(), -2.0, degrees, pane(0.9));
         let seen = build.quad(lamp[0], lamp[1], lamp[2], emitter(1.0));
@@ -73,7 +73,7 @@ fn a_pane_before_a_lamp_by_angle() {
 }
 
 #[test]
-fn a_tint_by_a_texture_stains_what_passes() {
+fn textured_tint_colors_transmitted_light() {
     let mut build = scene();
     let rows: [&[Vec3]; 1] = [&[Vec3::new(0.9, 0.2, 0.1), Vec3::new(0.1, 0.3, 2.0)]];
     let texture = build.texture(&rows, TextureFilter::Nearest, Wrap::Clamp, Vec2::ONE);
@@ -88,7 +88,7 @@ fn a_tint_by_a_texture_stains_what_passes() {
             assert!((seen - exact).length() < 1e-5, "{seen} is not {exact}");
         }
     }
-    // On a floor behind it, in the light of a small far lamp.
+    // On a floor behind it, lit by a small distant light.
     let floor = |x: f64| {
         window
             .clone()
@@ -105,7 +105,7 @@ fn a_tint_by_a_texture_stains_what_passes() {
 
 #[test]
 fn a_pane_reflects_the_rest() {
-    // The pane at 60° turns the ray by 60°, down to the lamp.
+    // The pane at 60° deflects the ray by 60°, down to the light.
     let seen = sheet(scene(), -2.0, 60.0, pane(0.9)).quad(
         v(-1e3, -500.0, 1e3),
         v(2e3, 0.0, 0.0),
@@ -118,7 +118,7 @@ fn a_pane_reflects_the_rest() {
     assert_mean("by paths", &path(seen).depth(1).values(256, 64), exact);
 }
 
-/// A receiver under a round lamp of radius 1 at height 2, on its axis, with something between them.
+/// A receiver under a round light of radius 1 at height 2, on its axis, with something in between.
 fn under_lamp(between: impl Fn(Build) -> Build) -> Build {
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
     between(receiver(DVec3::ZERO, 0.7)).shape(disk, emitter(1.0))
@@ -129,7 +129,7 @@ fn level(build: Build, y: f64, material: Material) -> Build {
 }
 
 #[test]
-fn a_lamp_lights_through_panes() {
+fn light_passes_through_panes() {
     // E = 2π·∫(1 − R')ⁿ·cos θ·sin θ dθ up to tan θ = ½.
     let irradiance = |count: i32, tint: f64| {
         let (steps, end) = (2000, 0.5_f64.atan());
@@ -149,15 +149,15 @@ fn a_lamp_lights_through_panes() {
             let values = lit.clone().shadows(Shadows::Soft, samples).values(256 / samples, 256);
             assert_mean(&format!("{count} panes, {samples} shadow rays"), &values, exact);
         }
-        assert_mean(&format!("{count} panes, by paths"), &path(lit.clone()).values(256, 256), exact);
-        // Photons add nothing to what goes straight on.
+        assert_mean(&format!("{count} panes, path-traced"), &path(lit.clone()).values(256, 256), exact);
+        // Photons add nothing to light that passes straight through.
         assert_mean(&format!("{count} panes, with photons"), &lit.photons(4096, 0.1).values(16, 64), exact);
     }
 }
 
 #[test]
-fn whitted_with_photons_finds_what_paths_find() {
-    // Light by a pane's reflection, and by reflections between the receiver and the pane.
+fn whitted_with_photons_matches_path() {
+    // Light reflected by a pane, and interreflections between the receiver and the pane.
     let lit = under_lamp(|build| {
         let build = level(build, 0.5, pane(0.9));
         build.quad(v(-1.0, 0.2, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.5, 0.0), veiled(mirror(0.9), 0.5)).quad(
@@ -173,13 +173,13 @@ fn whitted_with_photons_finds_what_paths_find() {
 }
 
 #[test]
-fn a_half_there_surface_shows_the_mean_of_both() {
-    // Radiance 4 with a chance of .25, before radiance 1.
+fn half_opacity_shows_the_mean_of_both_sides() {
+    // Radiance 4 with opacity .25, in front of radiance 1.
     let seen = lamp_at(sheet(scene(), -2.0, 20.0, veiled(emitter(4.0), 0.25)), -9.0);
     for build in [seen.clone(), path(seen)] {
         assert_mean("both", &build.values(256, 64), 0.25 * 4.0 + 0.75);
     }
-    // Black mirrors of some opacity, with cutoffs.
+    // Black mirrors with various opacities and cutoffs.
     let cut = |opacity, cutoff| {
         let mut material = veiled(mirror(0.0), opacity);
         material.opacity.cutoff = cutoff;
@@ -189,7 +189,7 @@ fn a_half_there_surface_shows_the_mean_of_both() {
 }
 
 #[test]
-fn shadows_are_as_deep_as_the_product_of_what_is_there() {
+fn shadows_multiply_transmittances() {
     let lit = |opacities: &[f32]| {
         let build = receiver(DVec3::ZERO, 0.7).point_light(v(0.0, 20.0, 0.0), 10.0, Falloff::None);
         let layer = |build: Build, (i, opacity): (usize, &f32)| {
@@ -211,7 +211,7 @@ fn shadows_are_as_deep_as_the_product_of_what_is_there() {
             assert_eq!(value(&[0.3, 1.0]), 0.0);
         }
     }
-    // One ray to the middle of a lamp decides alike; without shadows nothing weakens.
+    // One ray to the center of a light gives the same; without shadows nothing attenuates.
     let under = |shadows| {
         let lit = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.3)));
         mean_and_error(&lit.shadows(shadows, 1).values(256, 64)).0
@@ -220,7 +220,7 @@ fn shadows_are_as_deep_as_the_product_of_what_is_there() {
 }
 
 #[test]
-fn eyes_pass_64_surfaces_in_a_row() {
+fn camera_ray_passes_64_surfaces() {
     let seen = |count: u32| {
         let build = (0..count)
             .fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, veiled(matte(0.5), 0.0)));
@@ -239,7 +239,7 @@ fn eyes_pass_64_surfaces_in_a_row() {
 }
 
 #[test]
-fn lamps_that_are_half_there_shine_half() {
+fn half_opaque_lights_emit_half() {
     let full = mean_and_error(&under_lamp(|build| build).values(256, 64)).0;
     assert_close("the formula", full, 0.7 / 5.0);
     let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
@@ -250,8 +250,8 @@ fn lamps_that_are_half_there_shine_half() {
 }
 
 #[test]
-fn lamps_that_are_half_there_shine_through_themselves() {
-    // A convex lamp that emits from both sides, there by a part o, has radiance o in front and (1 − o)·o from behind.
+fn half_opaque_lights_shine_through_themselves() {
+    // A convex two-sided light with opacity o has radiance o in front and (1 − o)·o from behind.
     let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
     let (center, o) = (v(3.0, 2.0, 0.0), 0.4);
     let lit = |shape: &Shape, opacity: f32, sides: EmissionSides| {
@@ -278,11 +278,11 @@ fn lamps_that_are_half_there_shine_through_themselves() {
             let (mean, error) = mean_and_error(&build.values(256, 128));
             assert!(
                 (mean - exact).abs() < 4.0 * error + 2e-3 * exact,
-                "{name} by {what}: {mean}, not {exact}"
+                "{name} with {what}: {mean}, not {exact}"
             );
         }
     }
-    // What hides parts of itself has no closed form.
+    // Shapes that occlude themselves have no closed form.
     for shape in [
         Shape::Cylinder { a: center, b: center + v(1.0, 0.5, 0.1), radius: 0.5, caps: false },
         Shape::Torus { center, axis: v(0.2, 1.0, 0.3), radius: 1.0, tube: 0.3 },
@@ -295,8 +295,8 @@ fn lamps_that_are_half_there_shine_through_themselves() {
 }
 
 #[test]
-fn opacity_by_a_texture_shapes_lamps_and_shadows() {
-    // A square of side 2 at height 1, there on its left half alone: as a lamp, and as a screen before a sky.
+fn opacity_texture_shapes_lights_and_shadows() {
+    // A square of side 2 at height 1, opaque only on its left half: as a light, and as a screen in front of a sky.
     let square = |material: Material, build: Build| {
         build.quad(v(-1.0, 1.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), material)
     };
@@ -320,7 +320,7 @@ fn opacity_by_a_texture_shapes_lamps_and_shadows() {
 }
 
 #[test]
-fn a_furnace_with_panes_and_veils_stays_one() {
+fn furnace_with_panes_stays_one() {
     let build = scene()
         .environment(1.0)
         .sphere(v(0.0, 0.0, -6.0), 1.0, matte(1.0))
@@ -328,7 +328,7 @@ fn a_furnace_with_panes_and_veils_stays_one() {
         .sphere(v(0.5, 0.5, -6.0), 2.5, veiled(mirror(1.0), 0.4));
     let build = sheet(sheet(build, -2.0, 30.0, pane(1.0)), -2.5, -50.0, veiled(pane(1.0), 0.5)).depth(10_000);
     assert_mean("by paths", &path(build).values(256, 64), 1.0);
-    // Without anything diffuse, whitted has all light.
+    // Without diffuse surfaces, whitted finds all light.
     let clear =
         sheet(sheet(scene().environment(1.0), -2.0, 30.0, pane(1.0)), -4.0, -50.0, pane(1.0)).depth(60);
     let (mean, _) = mean_and_error(&clear.values(64, 16));
@@ -336,8 +336,8 @@ fn a_furnace_with_panes_and_veils_stays_one() {
 }
 
 #[test]
-fn highlights_of_lamps_are_seen_through_veils() {
-    // A sharp lobe has rays of its own, which pass as shadow rays and paths do.
+fn highlights_pass_partial_opacity() {
+    // A sharp lobe traces its own rays, which pass through as shadow rays and paths do.
     let lit = |material: Material| {
         scene()
             .quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), phong(0.2, 0.7, 3000.0, 0.0))
@@ -354,8 +354,8 @@ fn highlights_of_lamps_are_seen_through_veils() {
 }
 
 #[test]
-fn small_meshes_under_one_tree_weaken_each_by_itself() {
-    // Grids of 8 × 8 squares, enough for a common tree; the solid one is beside the way of the light.
+fn merged_small_meshes_attenuate_separately() {
+    // Grids of 8 × 8 squares, enough for a common tree; the solid one is off the light's path.
     let grid = |y: f64, x: f64| {
         let mut mesh = TriangleMesh::default();
         for i in 0..9 {
@@ -384,7 +384,7 @@ fn small_meshes_under_one_tree_weaken_each_by_itself() {
 }
 
 #[test]
-fn views_of_the_first_hit_pass_what_is_not_there() {
+fn first_hit_views_pass_transparent_surfaces() {
     let build = |opacity: f32| {
         let near = sheet(scene(), -2.0, 45.0, veiled(matte(0.5), opacity));
         sheet(near, -7.0, 0.0, matte(0.25))

@@ -1,4 +1,5 @@
-//! Glass that touches or overlaps glass, and opaque things: both surfaces count, in any order of the file, at any angle.
+//! Glass that touches or overlaps other glass or opaque surfaces: both surfaces count, in any order in the file, at any
+//! angle.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::materials::Dielectric;
@@ -11,7 +12,7 @@ use super::global::by_paths;
 use super::scenes::{self, AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, scene};
 use super::{Random, assert_close, mean_and_error, v};
 
-/// Unpolarised reflectance between indices `n` and `m` of a ray whose sine in air is `sine`, by Fresnel's amplitudes.
+/// Unpolarized reflectance between indices `n` and `m` of a ray whose sine in air is `sine`, from Fresnel's amplitudes.
 fn fresnel(n: f64, m: f64, sine: f64) -> f64 {
     let cosine = |n: f64| (1.0 - (sine / n).powi(2)).sqrt();
     let (a, b) = (cosine(n), cosine(m));
@@ -20,11 +21,11 @@ fn fresnel(n: f64, m: f64, sine: f64) -> f64 {
     0.5 * (across * across + along * along)
 }
 
-/// Reflectance and transmittance of a stack of layers in air, by adding one surface after another: between the stack so far and
-/// the next surface, light goes to and fro in a geometric series.
+/// Reflectance and transmittance of a stack of layers in air, adding one surface after another: between the stack so
+/// far and the next surface, the interreflections form a geometric series.
 fn layers(indices: &[f64], sine: f64) -> (f64, f64) {
     let media: Vec<f64> = [1.0].iter().chain(indices).chain(&[1.0]).copied().collect();
-    // For the stack so far: reflected from above, reflected from below, passed.
+    // The stack so far: reflected from above, reflected from below, transmitted.
     let (mut above, mut below, mut passed) = (0.0, 0.0, 1.0);
     for pair in media.windows(2) {
         let r = fresnel(pair[0], pair[1], sine);
@@ -37,7 +38,7 @@ fn layers(indices: &[f64], sine: f64) -> (f64, f64) {
 }
 
 #[test]
-fn the_layers_of_known_value() {
+fn layer_formula_matches_known_values() {
     // A slab: (1 − R)/(1 + R); n = 1.5 and 2: 1/T − 1 is the sum of R/(1 − R), 1/24 + 1/48 + 1/8.
     let (r, t) = layers(&[1.5], 0.0);
     assert_close("passed", t, 0.96 / 1.04);
@@ -46,7 +47,7 @@ fn the_layers_of_known_value() {
     assert_close("45°", layers(&[1.5], 0.5_f64.sqrt()).1, 0.904_326_79);
 }
 
-/// A scene that is turned as a whole.
+/// A scene that is rotated as a whole.
 #[derive(Clone, Copy)]
 struct Turned {
     degrees: DVec3,
@@ -68,7 +69,7 @@ impl Turned {
         Shape::Box { center, size: high - low, rotate: self.degrees }
     }
 
-    /// A square in y = `height` around the axis; the front is above.
+    /// A square at y = `height` around the axis, facing up.
     fn square(&self, height: f64, half: f64) -> Shape {
         let [corner, u, v] = [v(-half, height, half), v(2.0 * half, 0.0, 0.0), v(0.0, 0.0, -2.0 * half)];
         Shape::Quad { corner: self.axes * corner, u: self.axes * u, v: self.axes * v }
@@ -87,7 +88,7 @@ fn assert_within(what: &str, build: &Build, samples: u32, exact: f64, part: f64)
     assert!((mean - exact).abs() <= part * exact, "{what}: {mean} ± {error} is not {exact}");
 }
 
-/// Layers of glass, the first on top below y = 0, in the order of the file that `order` says.
+/// Layers of glass, the first on top below y = 0, in the file order given by `order`.
 fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> Build {
     let mut tops = vec![0.0];
     for (_, thickness) in layers {
@@ -100,7 +101,7 @@ fn stack(turned: &Turned, layers: &[(f64, f64)], order: &[usize], half: f64) -> 
 }
 
 #[test]
-fn two_boxes_that_share_a_face() {
+fn boxes_sharing_a_face_act_as_layers() {
     let level = Turned::by(DVec3::ZERO);
     let exact = layers(&[1.5, 2.0], 0.0).1;
     for order in [[0, 1], [1, 0]] {
@@ -109,12 +110,12 @@ fn two_boxes_that_share_a_face() {
         let white = both.clone().background(1.0);
         assert_within(&format!("{order:?}, white all around"), &white, 16, 1.0, 1e-3);
         let lamp = both.shape(level.square(-3.0, 5000.0), emitter(1.0));
-        assert_within(&format!("{order:?}, over a lamp"), &lamp, 512, exact, 2e-3);
+        assert_within(&format!("{order:?}, over a light"), &lamp, 512, exact, 2e-3);
     }
 }
 
 #[test]
-fn equal_indices_are_no_boundary_and_no_scattering() {
+fn equal_indices_are_no_boundary() {
     let level = Turned::by(DVec3::ZERO);
     let lamp_under = |index: f64, depth: u32| {
         stack(&level, &[(index, 1.0); 3], &[0, 1, 2], 500.0)
@@ -122,7 +123,7 @@ fn equal_indices_are_no_boundary_and_no_scattering() {
             .seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2))
             .depth(depth)
     };
-    // Two scatterings pass three boxes of one index, and none passes boxes of air.
+    // Two bounces pass three boxes of one index, and no bounce is needed for boxes of air.
     assert_within("boxes of one index", &lamp_under(1.5, 2), 512, 0.96 * 0.96, 2e-3);
     assert_within("by paths", &by_paths(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
     for air in [lamp_under(1.0, 0), by_paths(lamp_under(1.0, 0), 0)] {
@@ -132,7 +133,7 @@ fn equal_indices_are_no_boundary_and_no_scattering() {
 
 #[test]
 fn gaps_and_overlaps_down_to_rounding() {
-    // A gap has two more surfaces, of glass and air; an overlap is of the later one.
+    // A gap adds two surfaces, of glass and air; an overlap belongs to the later solid.
     let level = Turned::by(DVec3::ZERO);
     let touching = layers(&[1.5, 2.0], 0.0).1;
     let apart = layers(&[1.5, 1.0, 2.0], 0.0).1;
@@ -149,7 +150,7 @@ fn gaps_and_overlaps_down_to_rounding() {
             assert_within(&format!("gap {gap}, {later} later"), &both, 512, exact, 2e-3);
         }
     }
-    // Nearer than rounding is either of both.
+    // Below rounding, either result is correct.
     for gap in [1e-7, 3e-8] {
         let top = level.cuboid(v(-500.0, 0.0, -500.0), v(500.0, 1.0, 500.0));
         let bottom = level.cuboid(v(-500.0, -1.0, -500.0), v(500.0, -gap, 500.0));
@@ -162,7 +163,7 @@ fn gaps_and_overlaps_down_to_rounding() {
 }
 
 #[test]
-fn random_stacks_of_boxes_that_share_faces() {
+fn random_stacks_of_boxes_act_as_layers() {
     let mut random = Random(2026);
     for round in 0..40 {
         let turned = if round % 8 == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -179,7 +180,7 @@ fn random_stacks_of_boxes_that_share_faces() {
         let build = stack(&turned, &own, &order, 300.0).shape(lamp, emitter(1.0)).depth(400);
         let at = v(random.signed(), 0.0, random.signed());
         let build = turned.seen(build, at + v(angle.sin(), angle.cos(), 0.0) * 3.0, at);
-        // The indices as single precision has them.
+        // The indices in single precision.
         let indices: Vec<f64> = own.iter().map(|layer| f64::from(layer.0 as f32)).collect();
         let (_, exact) = layers(&indices, angle.sin());
         let what = format!("round {round}: {own:?} in the order {order:?} at {}°", angle.to_degrees());
@@ -198,14 +199,14 @@ fn a_drink_in_a_glass() {
             radius,
             caps: true,
         };
-        // A full glass: the drink shares the upper face; from above air to 1.33, 1.33 to 1.5, 1.5 to air.
+        // A full glass: the drink shares the upper face; from above, air to 1.33, 1.33 to 1.5, 1.5 to air.
         let full = scene().shape(bar(0.0, 2.0, 1.0), glass(1.5)).shape(bar(0.2, 2.0, 0.9), glass(1.33));
         let full = full.shape(turned.square(-1.0, 5000.0), emitter(1.0)).depth(200);
         let n = f64::from(1.33_f32);
         let what = format!("full, round {round}");
         let seen = turned.seen(full, v(0.05, 4.0, 0.02), v(0.05, 0.0, 0.02));
         assert_within(&what, &seen, 512, layers(&[n, 1.5], 0.0).1, 2e-3);
-        // A hollow glass, its inside given as air, filled to the wall: through the axis from the side.
+        // A hollow glass with an inside of air, filled up to the wall: through the axis from the side.
         let half = scene()
             .shape(bar(0.0, 2.0, 1.0), glass(1.5))
             .shape(bar(0.2, 2.0, 0.9), glass(1.0))
@@ -222,14 +223,14 @@ fn a_drink_in_a_glass() {
 }
 
 #[test]
-fn the_same_ball_twice_and_a_ball_that_fills_a_box() {
+fn coincident_and_inscribed_balls() {
     let lamp = |build: Build| {
         build.quad(v(-5e3, -3.0, 5e3), v(1e4, 0.0, 0.0), v(0.0, 0.0, -1e4), emitter(1.0)).depth(200)
     };
     let through = |build: Build| lamp(build).seen(v(0.0, 4.0, 0.0), DVec3::ZERO);
     let center = v(0.0, 0.1, 0.0);
     for (one, other) in [(1.5, 1.5), (2.0, 1.5), (1.3, 1.5)] {
-        // Coincident: the later counts.
+        // Coincident: the later ball counts.
         let twice = scene().sphere(center, 1.0, glass(one)).sphere(center, 1.0, glass(other));
         assert_within(&format!("{one} and {other}"), &through(twice), 512, layers(&[1.5], 0.0).1, 2e-3);
         let boxes = scene().cuboid(center, v(2.0, 3.0, 4.0), DVec3::ZERO, glass(one)).cuboid(
@@ -240,22 +241,22 @@ fn the_same_ball_twice_and_a_ball_that_fills_a_box() {
         );
         assert_within(&format!("boxes {one}, {other}"), &through(boxes), 512, layers(&[1.5], 0.0).1, 2e-3);
     }
-    // The ball touches the box from inside where the axis passes: above and below there is the ball alone.
+    // The ball touches the box from inside where the axis passes: above and below there is only the ball.
     let inside =
         scene().cuboid(center, DVec3::splat(2.0), DVec3::ZERO, glass(1.5)).sphere(center, 1.0, glass(2.0));
     assert_within("ball in a box", &through(inside), 512, layers(&[2.0], 0.0).1, 2e-3);
-    // A ball on a table of glass, through the point of contact.
+    // A ball on a glass table, through the point of contact.
     let table = scene().cuboid(v(0.0, -1.5, 0.0), v(20.0, 1.0, 20.0), DVec3::ZERO, glass(1.5));
     let on_table = table.sphere(DVec3::ZERO, 1.0, glass(2.0));
     assert_within("on a table", &through(on_table), 512, layers(&[2.0, 1.5], 0.0).1, 2e-3);
 }
 
 #[test]
-fn meshes_touch_boxes_and_their_own_parts() {
+fn touching_meshes_act_as_layers() {
     let mut random = Random(11);
     for round in 0..12 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
-        // Aimed beside the diagonal of the faces.
+        // Aimed next to the diagonal of the faces.
         let eye = v(0.13, 3.0, -0.08) + v(0.1, 0.0, 0.05) * random.signed();
         let at = eye - v(0.0, 3.0, 0.0);
         let lamp = |build: Build| build.shape(turned.square(-5.0, 5000.0), emitter(1.0)).depth(200);
@@ -270,7 +271,7 @@ fn meshes_touch_boxes_and_their_own_parts() {
             let what = format!("mesh on a box, round {round}, {later}");
             assert_within(&what, &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
         }
-        // Two parts of one mesh of other glass, that share a face of other triangles.
+        // Two parts of one mesh with different glass share a face with different triangles.
         let parts = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 1)]);
         let turn = |mut mesh: glimt::geometry::mesh::TriangleMesh| {
             for p in &mut mesh.positions {
@@ -281,7 +282,7 @@ fn meshes_touch_boxes_and_their_own_parts() {
         let parts = scene().own_mesh(turn(parts), vec![file_material(9, 1.5), file_material(9, 2.0)]);
         let seen = turned.seen(lamp(parts), eye, at);
         assert_within(&format!("parts, round {round}"), &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
-        // Of the same glass there is no surface between them.
+        // Between parts of the same glass there is no surface.
         let same = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 0)]);
         let same = scene().mesh(turn(same), AS_IT_IS, glass(1.5));
         let seen = turned.seen(lamp(same), eye, at);
@@ -290,7 +291,7 @@ fn meshes_touch_boxes_and_their_own_parts() {
 }
 
 #[test]
-fn glass_that_stands_on_something_opaque() {
+fn glass_on_an_opaque_surface() {
     let mut random = Random(5);
     let r = fresnel(1.0, 1.5, 0.0);
     for round in 0..12 {
@@ -304,14 +305,14 @@ fn glass_that_stands_on_something_opaque() {
         };
         for first in [false, true] {
             let what = |of: &str| format!("{of}, round {round}, floor first: {first}");
-            // Only the upper face passes the floor's emission; the floor absorbs what it reflects.
+            // Only the upper face transmits the floor's emission; the floor absorbs what it reflects.
             assert_within(&what("lamp"), &stood(emitter(1.0), first), 16, 1.0 - r, 1e-4);
             // r + (1 − r)²·m·Σ(m·r)ᵏ.
             let mirrored = stood(mirror(0.5), first).background(1.0);
             let exact = r + (1.0 - r).powi(2) * 0.5 / (1.0 - 0.5 * r);
             assert_within(&what("mirror"), &mirrored, 512, exact, 2e-3);
             assert_within(&what("lossless"), &stood(mirror(1.0), first).background(1.0), 512, 1.0, 1e-3);
-            // A lamp hangs at the ceiling: what is seen from below is the floor's back and no glass.
+            // A light hangs from the ceiling: from below, the camera sees the floor's back and no glass.
             let below = turned.seen(stood(emitter(1.0), first), v(0.2, -4.0, 0.1), v(0.2, 0.0, 0.1));
             assert_eq!(below.background(1.0).value(), 0.0, "{}", what("from below"));
         }
@@ -319,8 +320,8 @@ fn glass_that_stands_on_something_opaque() {
 }
 
 #[test]
-fn tints_count_where_their_glass_is() {
-    // Straight down through 1 of one tint and 2 of another, of one index: no surface between them reflects.
+fn tints_apply_within_their_glass() {
+    // Straight down through 1 of one tint and 2 of another, with equal indices: no surface between them reflects.
     let tinted = |tint: f64| scenes::tinted(1.5, DVec3::splat(tint));
     let level = Turned::by(DVec3::ZERO);
     let r = fresnel(1.0, 1.5, 0.0);
@@ -337,8 +338,8 @@ fn tints_count_where_their_glass_is() {
 }
 
 #[test]
-fn where_glasses_overlap_the_later_counts() {
-    // From y = 2 to 0 and from 1 to −1: between 1 and 0 the later one.
+fn later_glass_wins_where_solids_overlap() {
+    // From y = 2 to 0 and from 1 to −1: between 1 and 0 the later one counts.
     let level = Turned::by(DVec3::ZERO);
     let tinted = |ior: f32, tint: f64| scenes::tinted(ior, DVec3::splat(tint));
     for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
@@ -371,7 +372,7 @@ fn where_glasses_overlap_the_later_counts() {
 }
 
 #[test]
-fn an_eye_in_glass_knows_where_it_is() {
+fn camera_inside_glass_finds_its_medium() {
     let level = Turned::by(DVec3::ZERO);
     let r = fresnel(1.5, 2.0, 0.0);
     for first in [false, true] {
@@ -386,7 +387,7 @@ fn an_eye_in_glass_knows_where_it_is() {
 }
 
 #[test]
-fn a_white_furnace_of_glass_in_and_on_glass() {
+fn white_furnace_of_nested_glass() {
     let mut random = Random(99);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -425,8 +426,9 @@ fn a_white_furnace_of_glass_in_and_on_glass() {
 }
 
 #[test]
-fn ambient_light_in_glass_and_under_it() {
-    // Lossless glass on a white floor under ambient light 1, white all around: all that is seen is 1, in glass and out of it.
+fn ambient_light_in_and_under_glass() {
+    // Lossless glass on a white floor under ambient light 1, surrounded by white: the radiance is 1 everywhere, inside
+    // the glass and outside.
     let mut random = Random(17);
     for round in 0..6 {
         let turned = if round == 0 { Turned::by(DVec3::ZERO) } else { Turned::any(&mut random) };
@@ -450,7 +452,7 @@ fn ambient_light_in_glass_and_under_it() {
     }
 }
 
-/// A box of triangles; its corners are exactly those that are given.
+/// A box of triangles with exactly the given corners.
 fn block(low: DVec3, high: DVec3) -> TriangleMesh {
     let mut mesh = boxes(&[(DVec3::ZERO, 2.0, 0)]);
     for p in &mut mesh.positions {
@@ -470,7 +472,7 @@ fn assert_white(what: &str, build: Build) {
 }
 
 #[test]
-fn mesh_faces_in_the_coordinate_planes_touch_as_elsewhere() {
+fn mesh_faces_touch_in_coordinate_planes() {
     let one = DVec3::ONE;
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         // From −1 to 0 along the axis, and from 0 to 1.
@@ -496,7 +498,7 @@ fn mesh_faces_in_the_coordinate_planes_touch_as_elsewhere() {
         let pair = mesh(scene().shape(analytic(below), glass(1.5)), above, glass(1.33));
         assert_white(&what("a box and a mesh"), pair);
     }
-    // Eight that meet at the origin, where rays that meet their own faces again were without end.
+    // Eight solids meet at the origin, where rays that hit their own faces again would never end.
     let eight = (0..8_u32).fold(scene(), |build, i| {
         let low = v(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) - one;
         build.mesh(block(low, low + one), AS_IT_IS, glass([1.5, 1.33, 2.4][i as usize % 3]))

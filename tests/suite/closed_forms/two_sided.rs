@@ -1,4 +1,4 @@
-//! Lamps that shine from both sides.
+//! Two-sided area lights.
 
 use std::f64::consts::PI;
 
@@ -10,7 +10,7 @@ use super::direct::{assert_hard, assert_irradiance};
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, mirror, receiver, scene};
 use super::{assert_close, assert_mean, lambert, mean_and_error, v};
 
-/// A lamp of radiance 1 on both sides.
+/// A light with radiance 1 on both sides.
 fn both() -> Material {
     let mut material = emitter(1.0);
     material.emission.sides = EmissionSides::Both;
@@ -21,7 +21,7 @@ fn at_origin() -> Build {
     receiver(DVec3::ZERO, 0.7)
 }
 
-/// Checks the irradiance by light samples and by paths.
+/// Checks the irradiance with light samples and with path tracing.
 #[track_caller]
 fn assert_lit(what: &str, lit: &Build, irradiance: f64) {
     assert_irradiance(what, lit, irradiance);
@@ -30,13 +30,13 @@ fn assert_lit(what: &str, lit: &Build, irradiance: f64) {
 }
 
 #[test]
-fn flat_lamps_light_both_sides_alike() {
+fn flat_two_sided_lights_are_symmetric() {
     let corner = v(-0.3, 0.8, -0.5);
     let (x, z) = (v(0.9, 0.2, 0.0), v(0.1, 0.3, 1.0));
     let polygon = [corner, corner + x, corner + x + z, corner + z];
     let whole = lambert(DVec3::ZERO, DVec3::Y, &polygon);
     let half = lambert(DVec3::ZERO, DVec3::Y, &polygon[..3]);
-    // One of each pair has its front up.
+    // One of each pair faces up.
     for (u, w) in [(x, z), (z, x)] {
         let quad = at_origin().quad(corner, u, w, both());
         assert_lit("quad", &quad, whole);
@@ -53,7 +53,7 @@ fn flat_lamps_light_both_sides_alike() {
 }
 
 #[test]
-fn a_mesh_lamp_lights_both_sides_alike() {
+fn two_sided_mesh_lights_are_symmetric() {
     let corners = [v(-1.0, 1.0, -1.0), v(1.0, 1.0, -1.0), v(1.0, 1.0, 1.0), v(-1.0, 1.0, 1.0)];
     let exact = lambert(DVec3::ZERO, DVec3::Y, &corners);
     let of = |triangles: &[[u32; 3]]| TriangleMesh {
@@ -61,7 +61,7 @@ fn a_mesh_lamp_lights_both_sides_alike() {
         triangles: triangles.to_vec(),
         ..TriangleMesh::default()
     };
-    // The order of corners says which side is the front, a placement that mirrors keeps it.
+    // The winding order decides which side is the front, and a mirroring transform preserves it.
     for (name, mesh) in [
         ("down", of(&[[0, 1, 2], [0, 2, 3]])),
         ("up", of(&[[0, 2, 1], [0, 3, 2]])),
@@ -74,8 +74,8 @@ fn a_mesh_lamp_lights_both_sides_alike() {
 }
 
 #[test]
-fn a_lamp_around_a_surface_lights_it_from_everywhere() {
-    // All of the hemisphere has radiance 1: E = π.
+fn enclosing_light_fills_the_hemisphere() {
+    // The whole hemisphere has radiance 1: E = π.
     let at = v(2.0, 0.0, 0.0);
     let around = |shape: Shape| receiver(at, 0.7).shape(shape, both());
     for shape in [
@@ -92,8 +92,8 @@ fn a_lamp_around_a_surface_lights_it_from_everywhere() {
 }
 
 #[test]
-fn the_inside_of_an_open_tube() {
-    // From the axis, a disk of radius 1 at height h fills π/(1 + h²) of the irradiance.
+fn open_tube_light_shines_inside() {
+    // From the axis, a disk of radius 1 at height h accounts for π/(1 + h²) of the irradiance.
     let disk = |h: f64| PI / (1.0 + h * h);
     let tube = |from: f64, to: f64| {
         at_origin().shape(
@@ -103,7 +103,7 @@ fn the_inside_of_an_open_tube() {
     };
     assert_lit("from inside", &tube(-0.5, 1.5), PI - disk(1.5));
     assert_lit("from below", &tube(1.0, 2.0), disk(1.0) - disk(2.0));
-    // From beside, the outside hides the inside.
+    // From the side, the outside hides the inside.
     let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
     let of = |material: Material| {
         let shape = Shape::Cylinder { a: v(0.0, 0.0, 0.0), b: v(0.0, 1.0, 0.0), radius: 1.0, caps: true };
@@ -123,8 +123,8 @@ fn both_sides_are_seen() {
 }
 
 #[test]
-fn photons_come_from_both_sides() {
-    // The lamp's back faces a mirror that throws its light on the receiver.
+fn two_sided_lights_emit_photons_on_both_sides() {
+    // The light's back faces a mirror that reflects its light to the receiver.
     let lit = receiver(DVec3::ZERO, 0.7).quad(v(-0.5, 1.0, -0.5), v(0.0, 0.0, 1.0), DVec3::X, both()).quad(
         v(-3.0, 2.0, -3.0),
         v(6.0, 0.0, 0.0),

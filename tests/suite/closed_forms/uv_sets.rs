@@ -1,4 +1,4 @@
-//! Textures by the second set of coordinates of a mesh.
+//! Textures that use a mesh's second set of texture coordinates.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
@@ -12,7 +12,7 @@ use super::{assert_mean, v};
 
 /// The corners of the wall.
 const CORNERS: [DVec3; 4] = [v(-1.0, -1.0, 0.0), v(1.0, -1.0, 0.0), v(1.0, 1.0, 0.0), v(-1.0, 1.0, 0.0)];
-/// Places of the corners in the picture.
+/// Positions of the corners in the texture.
 const RIGHT: [Vec2; 4] = [Vec2::new(0.1, 0.2), Vec2::new(1.7, 0.1), Vec2::new(1.9, 1.4), Vec2::new(0.3, 1.2)];
 
 /// A wall that faces +z, with these sets of coordinates.
@@ -33,7 +33,7 @@ fn texture(build: &mut Build, filter: TextureFilter) -> usize {
     build.texture(&[&rows[0], &rows[1]], filter, Wrap::Repeat, Vec2::ONE)
 }
 
-/// Materials that look up one texture each in a way of their own.
+/// Materials that each look up one texture in a different way.
 fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     let number = || NumberSource::Texture { texture, channel: None };
     let lit = phong(0.5, 0.3, 20.0, 0.0);
@@ -59,7 +59,7 @@ fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     ]
 }
 
-/// The picture of a wall under a lamp and a sky, with a mirror of light beside it.
+/// The image of a wall under an area light and a sky, next to a mirror that reflects light onto it.
 fn picture(build: &Build, mesh: TriangleMesh, material: Material, mirrored: f64) -> Vec<DVec3> {
     let lamp = v(0.5, 1.5, 2.0);
     build
@@ -73,9 +73,9 @@ fn picture(build: &Build, mesh: TriangleMesh, material: Material, mirrored: f64)
         .picture(4, 0)
 }
 
-/// A look-up by the second set gives the bits that it would give if that set were the first.
+/// Checks that a lookup with the second set gives the same bits as if that set were the first.
 #[test]
-fn the_second_set_is_looked_up_as_the_first_one_is() {
+fn second_uv_set_gives_the_bits_of_the_first() {
     const OTHER: [Vec2; 4] =
         [Vec2::splat(0.5), Vec2::new(0.6, 0.5), Vec2::new(0.6, 0.7), Vec2::new(0.5, 0.9)];
     for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
@@ -90,8 +90,8 @@ fn the_second_set_is_looked_up_as_the_first_one_is() {
                     let expected = seen(&build, wall(&RIGHT, &[]));
                     assert_eq!(seen(&second, wall(&OTHER, &RIGHT)), expected, "{what}");
                     assert_eq!(seen(&build, wall(&RIGHT, &OTHER)), expected, "the first: {what}");
-                    assert_ne!(seen(&build, wall(&OTHER, &RIGHT)), expected, "both show something: {what}");
-                    // Without a second set, the first counts.
+                    assert_ne!(seen(&build, wall(&OTHER, &RIGHT)), expected, "both have light: {what}");
+                    // Without a second set, the first is used.
                     assert_eq!(seen(&second, wall(&RIGHT, &[])), expected, "none: {what}");
                 }
             }
@@ -99,10 +99,10 @@ fn the_second_set_is_looked_up_as_the_first_one_is() {
     }
 }
 
-/// A wall in a furnace of radiance 1: its reflectance by one set and its emission by the other, as glTF files have them.
+/// A wall in a furnace of radiance 1: reflectance from one set and emission from the other, as in glTF files.
 #[test]
-fn both_sets_count_in_one_material() {
-    // The colour changes from left to right by the first set, the emission upwards by the second.
+fn one_material_can_use_both_uv_sets() {
+    // The color changes from left to right in the first set, the emission upwards in the second.
     let first = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
     let second = [Vec2::ZERO, Vec2::Y, Vec2::ONE, Vec2::X];
     let (colors, lights) = ([0.25, 0.75], [0.5, 2.0]);

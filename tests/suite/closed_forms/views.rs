@@ -1,4 +1,4 @@
-//! Views of the trees and of their cost.
+//! Views of the acceleration structures and of their cost.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
@@ -9,7 +9,7 @@ use glimt::scene::description::{Accel, Integrator, Shadows};
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::v;
 
-/// A picture of 64 × 64 pixels, each 1/64 wide at a distance of 1, along −z.
+/// An image of 64 × 64 pixels, each 1/64 wide at a distance of 1, along −z.
 fn framed(build: Build, view: View) -> Vec<DVec3> {
     let fov = 2.0 * 0.5_f64.atan().to_degrees();
     build.pictured(DVec3::ZERO, DVec3::NEG_Z, fov, 64, 64).viewed(view).picture(64, 2)
@@ -25,34 +25,34 @@ fn ball() -> Build {
 }
 
 #[test]
-fn the_edges_of_a_box_are_drawn_where_they_are() {
+fn box_edges_are_drawn_in_place() {
     let (plain, drawn) = (framed(ball(), View::Beauty), framed(ball(), View::Bounds));
-    // The near side is seen at ¼, which is 16 pixels from the middle, the far one at ⅙, which is 10⅔.
+    // The near side appears at ¼, which is 16 pixels from the center, the far one at ⅙, which is 10⅔.
     let root = DVec3::new(1.0, 0.85, 0.1);
     let share = |x, y| (at(&drawn, x, y) - at(&plain, x, y)).dot(root) / (root - at(&plain, x, y)).dot(root);
-    // Inside of the box a line reaches half its width of 1¼ pixels: 0.625 of the last pixel.
+    // Inside the box, a line reaches half its width of 1¼ pixels: 0.625 of the last pixel.
     for (x, y) in [(47, 20), (16, 40), (30, 16), (33, 47)] {
         assert!((share(x, y) - 0.625).abs() < 0.12, "{x}, {y}: {}", share(x, y));
     }
-    // Before the ball nothing is drawn; the far edges are behind it, next to it they are not, and are whole.
+    // Nothing is drawn in front of the ball; far edges are faint behind it, and full next to it.
     assert_eq!(at(&drawn, 32, 32), at(&plain, 32, 32));
     assert_eq!(at(&drawn, 50, 32), DVec3::ZERO, "beside the box");
     let faint = share(42, 32);
     assert!(faint > 0.1 && faint < 0.35, "{faint}: behind the ball");
     let whole = share(42, 22).max(share(21, 22));
-    assert!(whole > 0.5, "{whole}: beside the ball");
+    assert!(whole > 0.5, "{whole}: next to the ball");
 }
 
 #[test]
-fn exposure_leaves_lines_as_bright_as_they_are() {
+fn exposure_does_not_affect_lines() {
     let lines = |exposure: f32| framed(ball().with(|scene| scene.render.exposure = exposure), View::Bounds);
     let (plain, dark) = (lines(0.0), lines(-3.0));
     assert!((at(&dark, 16, 40) - at(&plain, 16, 40) * 8.0).length() < 1e-5);
 }
 
 #[test]
-fn both_kinds_of_trees_over_triangles_show_their_boxes() {
-    // Two triangles side by side, a unit apart: their boxes, or cells that a plane between them parts.
+fn both_triangle_trees_show_their_boxes() {
+    // Two triangles side by side, a unit apart: their boxes, or the cells on both sides of a splitting plane.
     let corner = |x: f32, y: f32| Vec3::new(x, y, -4.0);
     let mesh = || TriangleMesh {
         positions: (0..40)
@@ -75,21 +75,21 @@ fn both_kinds_of_trees_over_triangles_show_their_boxes() {
         assert_eq!((at(picture, 4, 32), at(picture, 61, 32)), (DVec3::ZERO, DVec3::ZERO));
     }
     let lit = |picture: &[DVec3]| (10..54).filter(|&x| at(picture, x, 32).max_element() > 0.3).count();
-    assert!(lit(&boxes) > 0 && lit(&planes) > 0, "what is inside of the root shows");
+    assert!(lit(&boxes) > 0 && lit(&planes) > 0, "nodes inside the root are visible");
     assert_ne!(boxes, planes);
 }
 
 #[test]
 fn cost_counts_boxes_and_shapes() {
-    // The root, its leaf and the ball in it; beside the box nothing.
+    // The root, its leaf and the ball in it; next to the box nothing.
     let cost = framed(ball(), View::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (3.0, 0.0));
     assert_eq!(at(&cost, 46, 17).x, 3.0, "through the box and past the ball");
-    // An infinite plane is tested by every ray.
+    // Every ray tests an infinite plane.
     let floor = glimt::scene::description::Shape::Plane { point: v(0.0, -2.0, 0.0), normal: DVec3::Y };
     let cost = framed(ball().shape(floor, matte(0.5)), View::Cost);
     assert_eq!((at(&cost, 32, 32).x, at(&cost, 2, 2).x), (4.0, 1.0));
-    // A lit point sends one ray to the light, which starts in the box; what it hits does not matter.
+    // A lit point sends one ray to the light, which starts inside the box; its target does not matter.
     let lit =
         |shadows| framed(ball().point_light(DVec3::ZERO, 1.0, Falloff::None).shadows(shadows, 1), View::Cost);
     assert_eq!(at(&lit(Shadows::Hard), 32, 32).x, 6.0);
@@ -97,14 +97,14 @@ fn cost_counts_boxes_and_shapes() {
 }
 
 #[test]
-fn cost_counts_what_goes_on_by_paths_too() {
+fn cost_includes_indirect_rays() {
     let bounce = |depth: u32| {
         let build =
             ball().depth(depth).environment(1.0).with(|scene| scene.render.integrator = Integrator::Path);
         at(&framed(build, View::Cost), 32, 32).x
     };
-    // The ray that goes on is the only one that looks for a constant sky. It leaves the ball: it visits the root and the leaf
-    // again.
+    // The scattered ray is the only one that looks for a constant sky. It leaves the ball: it visits the root and the
+    // leaf again.
     assert_eq!(bounce(0), 3.0);
     assert!(bounce(1) > 3.0 && bounce(1) <= 6.0, "{}", bounce(1));
 }

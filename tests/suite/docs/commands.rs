@@ -1,4 +1,4 @@
-//! The commands of the pages, run in a scratch copy at small sizes.
+//! Runs the commands of every page in a scratch copy, at small sizes.
 
 use std::collections::HashSet;
 use std::os::unix::fs::symlink;
@@ -8,9 +8,9 @@ use std::process::Command;
 use super::{Block, Page, pages, root};
 use crate::test_dir::PROGRAM;
 
-/// Programs that pages name and this test does not start.
+/// Programs named on the pages that this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
-/// Commands of glimt other than rendering.
+/// Subcommands of glimt.
 const COMMANDS: [&str; 15] = [
     "check",
     "new",
@@ -30,7 +30,7 @@ const COMMANDS: [&str; 15] = [
 ];
 
 #[test]
-fn the_commands_of_every_page_run() {
+fn page_commands_run() {
     let mut with_commands = HashSet::new();
     for page in pages() {
         let folder = tempfile::tempdir().expect("a scratch folder");
@@ -51,8 +51,8 @@ fn the_commands_of_every_page_run() {
     }
 }
 
-/// Makes the folder in which commands are called: the bundled scenes, the program, and the files that the page shows,
-/// which name themselves in their first lines.
+/// Creates the folder in which commands run: the bundled scenes, the program, and the files that a page shows, each
+/// named in its first line.
 fn furnish(folder: &Path, page: &Page) {
     for name in ["scenes", "assets"] {
         symlink(root().join(name), folder.join(name)).expect("linked");
@@ -101,7 +101,7 @@ fn script(text: &str) -> (String, usize) {
     (script, count)
 }
 
-/// A call of glimt as this test makes it: calls that open the terminal are checked, renders are small.
+/// A call of glimt as this test runs it: calls that would open the terminal become checks, renders become small.
 fn call(line: &str) -> String {
     let cut = ["2>", "|"].iter().filter_map(|mark| line.find(mark)).min().unwrap_or(line.len());
     let (call, rest) = line.split_at(cut);

@@ -1,4 +1,4 @@
-//! Links between pages, pictures, and the files that pages name.
+//! Links between pages, images, and the files that pages name.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,13 +6,13 @@ use std::path::Path;
 
 use super::{codes, page, pages, root};
 
-/// The targets of links, without those in the web.
+/// The targets of links, except web links.
 fn targets(text: &str) -> Vec<String> {
     let ends = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
     ends.filter(|target| !target.starts_with("https://")).map(str::to_owned).collect()
 }
 
-/// The anchor of a heading, as GitHub makes it.
+/// The anchor of a heading, as GitHub generates it.
 fn anchor(heading: &str) -> String {
     let kept = heading.to_lowercase().replace(' ', "-");
     kept.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '_')).collect()
@@ -38,7 +38,7 @@ fn links_lead_somewhere() {
 }
 
 #[test]
-fn files_that_pages_name_are_there() {
+fn files_named_on_pages_exist() {
     let folders = ["crates/", "src/", "tests/", "scenes/", "assets/", "benches/", "docs/", ".ci/"];
     // Made, not stored.
     let made = ["assets/million.ply", "assets/figure.ply"];
@@ -58,7 +58,7 @@ fn every_picture_is_shown() {
         .flat_map(|page| page.prose().flat_map(targets).collect::<Vec<_>>())
         .filter_map(|target| Some(target.split_once("pictures/")?.1.to_owned()))
         .collect();
-    let folder = fs::read_dir(root().join("assets/pictures")).expect("the folder of pictures");
+    let folder = fs::read_dir(root().join("assets/pictures")).expect("the folder of images");
     let there = folder.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned());
     let there: BTreeSet<String> = there.filter(|name| name.contains('.') && !name.ends_with(".py")).collect();
     let other: Vec<_> = there.difference(&shown).collect();
@@ -66,7 +66,7 @@ fn every_picture_is_shown() {
 }
 
 #[test]
-fn anchors_are_those_of_github() {
+fn anchors_match_github() {
     assert_eq!(anchor("What is replaced, and what never is"), "what-is-replaced-and-what-never-is");
     assert_eq!(anchor("Beside Mitsuba 3.9"), "beside-mitsuba-39");
     assert_eq!(anchor("`[[mesh]]`"), "mesh");

@@ -1,5 +1,4 @@
-//! The pages for users, checked against the program: their commands run, their scenes are right, their tables are
-//! complete.
+//! The user documentation against the program: its commands run, its scenes are valid, its tables are complete.
 
 mod commands;
 mod links;
@@ -12,16 +11,16 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A page in Markdown.
+/// A Markdown page.
 struct Page {
-    /// Its path below the root of the repository.
+    /// Its path relative to the root of the repository.
     name: String,
     text: String,
 }
 
 /// A fenced block of a page.
 struct Block {
-    /// The line of its fence, from 1.
+    /// The line of its opening fence, from 1.
     line: usize,
     text: String,
 }
@@ -30,7 +29,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// README, the pages beside it, and those in `docs`.
+/// README, the pages next to it, and the pages in `docs`.
 fn pages() -> Vec<Page> {
     let beside = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(PathBuf::from);
     let inside = fs::read_dir(root().join("docs")).expect("the folder of pages");
@@ -48,7 +47,7 @@ fn page(name: &str) -> Page {
 }
 
 impl Page {
-    /// The fenced blocks of a language.
+    /// The fenced blocks in a language.
     fn blocks(&self, language: &str) -> Vec<Block> {
         let mut blocks = Vec::new();
         let mut open: Option<(usize, &str, String)> = None;
@@ -79,7 +78,7 @@ impl Page {
         })
     }
 
-    /// The headings with the cells of the table rows below each, without the heads of the tables.
+    /// The headings, each with the cells of the table rows below it, without the tables' header rows.
     fn tables(&self) -> Vec<(String, Vec<Vec<String>>)> {
         let mut tables = vec![(String::new(), Vec::new())];
         let mut was_row = false;
@@ -106,19 +105,19 @@ impl Page {
     }
 }
 
-/// The cells of a row; `\|` is a bar.
+/// The cells of a row; `\|` is an escaped bar.
 fn cells(row: &str) -> Vec<String> {
     let row = row.replace("\\|", "\u{0}");
     let inner = row.trim().trim_start_matches('|').trim_end_matches('|');
     inner.split('|').map(|cell| cell.trim().replace('\u{0}', "|")).collect()
 }
 
-/// The texts between backquotes.
+/// The texts in backquotes.
 fn codes(text: &str) -> BTreeSet<String> {
     text.split('`').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
 #[test]
-fn the_readme_is_read_in_a_few_minutes() {
+fn readme_is_short() {
     assert!(page("README.md").text.lines().count() <= 160);
 }

@@ -1,4 +1,4 @@
-//! The tables of options, beside what the program's help says.
+//! The tables of options against the program's help.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ fn help(command: &str) -> String {
     String::from_utf8(output.stdout).expect("UTF-8")
 }
 
-/// The long options that a help lists, but for those of every program; what it says of them stands further in.
+/// The long options in a help text, except the ones every program has; their descriptions are indented further.
 fn listed(help: &str) -> BTreeSet<String> {
     let lines = help.lines().filter(|line| !line.starts_with("        ")).map(str::trim_start);
     let words = lines
@@ -24,7 +24,7 @@ fn without_common(options: impl Iterator<Item = String>) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_tables_of_options_have_those_of_the_program() {
+fn option_tables_match_the_help() {
     let page = page("docs/command-line.md");
     for (heading, command) in [
         ("Options of a render", ""),
@@ -49,7 +49,7 @@ fn the_tables_of_options_have_those_of_the_program() {
 fn every_command_is_documented() {
     let help = help("");
     let commands = help.split("Commands:\n").nth(1).and_then(|rest| rest.split("\n\n").next());
-    // What a command does may go on in a further line, which stands further in.
+    // A command's description may continue on the next line, which is indented further.
     let lines = commands.expect("commands").lines().filter(|line| !line.starts_with("   "));
     let names = lines.filter_map(|line| line.split_whitespace().next());
     let rows = page("docs/command-line.md").rows("Commands");
@@ -60,7 +60,7 @@ fn every_command_is_documented() {
 }
 
 #[test]
-fn every_value_of_an_option_is_documented() {
+fn every_option_value_is_documented() {
     let documented: BTreeSet<String> =
         pages().iter().flat_map(|page| page.prose().flat_map(codes).collect::<Vec<_>>()).collect();
     let plain = |code: &String| code.trim_matches('"').to_owned();
@@ -75,7 +75,7 @@ fn every_value_of_an_option_is_documented() {
 }
 
 #[test]
-fn the_page_has_the_variables_of_the_program() {
+fn environment_variables_are_documented() {
     let rows = page("docs/command-line.md").rows("Environment variables");
     let listed = glimt::cli::environment::VARIABLES;
     let expected = listed.map(|(names, effect)| {

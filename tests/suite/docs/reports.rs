@@ -1,4 +1,4 @@
-//! The keys of the report and of progress as JSON, beside what a render writes.
+//! The documented keys of the report and of JSON progress against an actual render.
 
 use std::collections::BTreeSet;
 
@@ -7,17 +7,18 @@ use serde_json::Value;
 use super::{codes, page};
 use crate::test_dir::TestDir;
 
-/// A glass ball, so that photons have somewhere to go.
+/// A glass ball, so that photons are emitted.
 fn dir() -> TestDir {
     let dir = TestDir::new();
-    let scene = crate::test_dir::SCENE.replace("type = \"phong\"\ndiffuse = [0.8, 0.2, 0.1]", "type = \"glass\"");
+    let scene =
+        crate::test_dir::SCENE.replace("type = \"phong\"\ndiffuse = [0.8, 0.2, 0.1]", "type = \"glass\"");
     let floor =
         "[materials.floor]\n[[plane]]\nmaterial = \"floor\"\n[photons]\nenabled = true\ncount = 1000\n";
     dir.write("glass.toml", format!("{scene}{floor}"));
     dir
 }
 
-/// The paths of all values, with dots; those of the tables between, apart.
+/// The dotted paths of all values, and separately those of the tables.
 fn paths(value: &Value, path: &str, ends: &mut BTreeSet<String>, tables: &mut BTreeSet<String>) {
     let inner: Vec<(String, &Value)> = match value {
         Value::Object(map) => {
@@ -38,7 +39,7 @@ fn paths(value: &Value, path: &str, ends: &mut BTreeSet<String>, tables: &mut BT
 }
 
 #[test]
-fn the_page_has_every_key_of_the_report() {
+fn report_keys_are_documented() {
     let (mut ends, mut tables) = (BTreeSet::new(), BTreeSet::new());
     paths(&dir().report("glass.toml"), "", &mut ends, &mut tables);
     let rows = page("docs/report.md").rows("The report");
@@ -51,7 +52,7 @@ fn the_page_has_every_key_of_the_report() {
 }
 
 #[test]
-fn the_page_has_every_key_of_progress() {
+fn progress_keys_are_documented() {
     let rows = page("docs/report.md").rows("Progress as JSON");
     let dir = dir();
     dir.write("broken.toml", "[render]\nheigth = 1\n");

@@ -1,4 +1,4 @@
-//! The scenes of the pages: whole ones as they stand, fragments with what they refer to.
+//! The scenes on the pages: whole scenes unchanged, fragments completed with whatever they refer to.
 
 use std::collections::BTreeSet;
 
@@ -9,13 +9,13 @@ use crate::contract::errors;
 
 const CAMERA: &str = "\n[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
-/// The names behind a word, such as those of `material = "clay"`.
+/// The names after a key, such as the materials in `material = "clay"`.
 fn names(text: &str, before: &str) -> BTreeSet<String> {
     let rests = text.split(before).skip(1);
     rests.filter_map(|rest| rest.split('"').next()).map(str::to_owned).collect()
 }
 
-/// A fragment with a camera, and with the materials and textures that it names and does not have.
+/// A fragment, completed with a camera and with the materials and textures that it names but does not define.
 fn completed(fragment: &str) -> String {
     let mut text = format!("{fragment}{CAMERA}");
     let has = |kind: &str, name: &str| {
@@ -32,7 +32,7 @@ fn completed(fragment: &str) -> String {
 }
 
 #[test]
-fn the_scenes_of_every_page_are_right() {
+fn page_scenes_are_valid() {
     let mut count = 0;
     for page in pages() {
         for Block { line, text } in page.blocks("toml") {

@@ -1,5 +1,5 @@
-//! The definition of a scene's keys, beside what the program takes (keys, defaults, ranges, the words of choices) and beside the
-//! tables of the page.
+//! The definition of the scene keys against the program (keys, defaults, ranges, choices) and against the documented
+//! tables.
 
 use std::collections::BTreeSet;
 
@@ -12,17 +12,17 @@ use glimt::scene::parse;
 use super::{codes, page, root};
 use crate::contract::{errors, placeless};
 
-/// A key of a table, of one of the table's types.
+/// A key of a table, in one of the table's types.
 #[derive(Clone)]
 struct Key {
     info: &'static KeyInfo,
     name: String,
 }
 
-/// A table of the definition, and the head of one in a scene.
+/// A table of the definition, and its header in a scene.
 struct Table {
     head: String,
-    /// The headings of the page that have its rows, with the number of rows of each.
+    /// The headings of the page that have its rows, with the number of rows below each.
     headings: Vec<(String, usize)>,
     keys: Vec<Key>,
 }
@@ -34,7 +34,7 @@ fn tables() -> Vec<Table> {
     keys::tables().iter().flat_map(of_definition).collect()
 }
 
-/// The tables of scenes that a table of the definition stands for: one for each type.
+/// The scene tables that a definition table covers: one for each type.
 fn of_definition(table: &'static TableInfo) -> Vec<Table> {
     let head = table.head().replace("NAME", "it");
     let heading = |code: String| format!("`{code}`");
@@ -42,7 +42,7 @@ fn of_definition(table: &'static TableInfo) -> Vec<Table> {
     if table.types.is_empty() {
         let keys: Vec<Key> = table.keys_of(None).map(key).collect();
         let headings = match table.form {
-            // The last two are those of every shape.
+            // The last two are keys of every shape.
             Form::List => {
                 vec![(heading(table.head()), keys.len() - 2), ("Every shape".to_owned(), 2)]
             }
@@ -52,7 +52,7 @@ fn of_definition(table: &'static TableInfo) -> Vec<Table> {
     }
     let of_type = |kind: &'static TypeInfo| {
         let code = format!("type = \"{}\"", kind.name);
-        // Opacity is for surfaces.
+        // Opacity applies only to surfaces.
         let is_solid = |info: &KeyInfo| kind.name == "glass" && info.name.starts_with("opacity");
         let keys = table.keys_of(Some(kind)).filter(|info| !is_solid(info)).map(key).collect();
         let own = (heading(code.clone()), kind.keys.len());
@@ -63,7 +63,7 @@ fn of_definition(table: &'static TableInfo) -> Vec<Table> {
     table.types.iter().map(of_type).collect()
 }
 
-/// A value for a key that must be there.
+/// A value for a required key.
 fn example(head: &str, key: &str) -> &'static str {
     match key {
         "position" => "[0, 1, 4]",
@@ -78,7 +78,7 @@ fn example(head: &str, key: &str) -> &'static str {
 }
 
 impl Table {
-    /// A scene with this table: its required keys but for one, and a line of its own.
+    /// A scene with this table: its required keys except one, and an extra line.
     fn scene(&self, without: &str, line: &str) -> String {
         let required = self
             .keys
@@ -87,10 +87,10 @@ impl Table {
         let lines: String =
             required.map(|key| format!("{} = {}\n", key.name, example(&self.head, &key.name))).collect();
         let camera = if self.head.starts_with("[camera]") { "" } else { CAMERA };
-        // The mesh of the example has none.
+        // The mesh of the example has no materials.
         let is_bare = self.head.starts_with("[[mesh]]") && without != "material";
         let material = if is_bare { "material = \"wall\"\n" } else { "" };
-        // A metal has exactly one of three groups of keys.
+        // A metal needs exactly one of three groups of keys.
         let group = match without {
             _ if !self.head.contains("\"metal\"") => "",
             "color" | "element" => "",
@@ -101,7 +101,7 @@ impl Table {
         format!("{camera}{WALL}{}{lines}{material}{group}{line}\n", self.head)
     }
 
-    /// Returns the diagnostics of a value of a key.
+    /// Returns the diagnostics for a value of a key.
     fn said(&self, key: &Key, value: &str) -> Vec<Diagnostic> {
         let text = self.scene(&key.name, &format!("{} = {value}", key.name));
         parse(text.into(), &root().join("scenes/page.toml")).diagnostics
@@ -111,13 +111,13 @@ impl Table {
         errors(&self.said(key, value)).is_empty()
     }
 
-    /// Parses the table with a line in place of a key; returns the errors and the scene.
+    /// Parses the table with a line instead of a key; returns the errors and the scene.
     fn with(&self, key: &Key, line: &str) -> (String, Option<Scene>) {
         let outcome = parse(self.scene(&key.name, line).into(), &root().join("scenes/page.toml"));
         (errors(&outcome.diagnostics).join("\n"), outcome.scene.map(placeless))
     }
 
-    /// Names a default that is not the program's.
+    /// Reports a default that differs from the program's.
     fn wrong_default(&self, key: &Key) -> Option<String> {
         let (said, without) = self.with(key, "");
         if matches!(key.info.default, Default::Required(_)) {
@@ -129,7 +129,7 @@ impl Table {
         (!is_right).then(|| format!("{}{}: {:?} {said}{refused}", self.head, key.name, key.info.default))
     }
 
-    /// Names a range that is not the program's.
+    /// Reports a range that differs from the program's.
     fn wrong_range(&self, key: &Key) -> Option<String> {
         let (inside, outside) = key.range()?;
         let of = |number: f64| value(key.info.kind, number);
@@ -149,10 +149,10 @@ impl Key {
         }
     }
 
-    /// Numbers that the range has, and numbers that it does not have.
+    /// Numbers inside the range, and numbers outside it.
     fn range(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         match self.info.kind {
-            // Those of glTF files, which the scene of this test does not name.
+            // Keys for glTF files, which the scene of this test does not use.
             Kind::Whole(..) if self.info.default == Default::Absent => None,
             Kind::Whole(least, most) => {
                 Some((vec![least as f64, most as f64], vec![least as f64 - 1.0, most as f64 + 1.0]))
@@ -163,7 +163,7 @@ impl Key {
             | Kind::Emission(limits)
             | Kind::NumberOrTexture(limits)
             | Kind::Scale(limits) => ends(limits),
-            // A direction is not of length 0, and a matrix has a last row.
+            // A direction must not be zero, and a matrix has a fixed last row.
             Kind::Numbers(count, _, limits) if limits != Limits::Any || count == 2 => ends(limits),
             Kind::Numbers(..) => None,
             Kind::Flag
@@ -190,7 +190,7 @@ fn ends(limits: Limits) -> Option<(Vec<f64>, Vec<f64>)> {
     })
 }
 
-/// The row of a page for a key: the words of a choice in any order, and a link at the end, are the page's own.
+/// The page's row for a key. The order of choices, and a link at the end, are up to the page.
 fn is_row(row: &[String], key: &KeyInfo) -> bool {
     let [name, kind, unit, range, default, meaning] = row else { return false };
     let has_kind =
@@ -205,7 +205,7 @@ fn is_row(row: &[String], key: &KeyInfo) -> bool {
         && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(". See "))
 }
 
-/// A text with the words of its links alone.
+/// A text with each link replaced by its words.
 fn unlinked(text: &str) -> String {
     let Some((before, after)) = text.split_once("](") else { return text.to_owned() };
     let (begin, words) = before.rsplit_once('[').unwrap_or((before, ""));
@@ -214,7 +214,7 @@ fn unlinked(text: &str) -> String {
 }
 
 #[test]
-fn the_rows_of_the_page_are_those_of_the_definition() {
+fn documented_rows_match_the_definition() {
     let page = page("docs/scene.md");
     let (mut wrong, mut count) = (Vec::new(), 0);
     for Table { head, headings, keys: _ } in tables() {
@@ -241,7 +241,7 @@ fn the_rows_of_the_page_are_those_of_the_definition() {
 }
 
 #[test]
-fn the_definition_has_the_keys_of_every_table() {
+fn definition_has_every_key() {
     let tables = tables();
     assert_eq!(tables.len(), 24);
     for table in tables {
@@ -259,7 +259,7 @@ fn the_definition_has_the_keys_of_every_table() {
 }
 
 #[test]
-fn the_defaults_of_the_definition_are_those_of_the_program() {
+fn defined_defaults_match_the_program() {
     let tables = tables();
     let keys = || tables.iter().flat_map(|table| table.keys.iter().map(move |key| (table, key)));
     let wrong: Vec<String> = keys().filter_map(|(table, key)| table.wrong_default(key)).collect();
@@ -276,7 +276,7 @@ fn value(kind: Kind, number: f64) -> String {
 }
 
 #[test]
-fn the_ranges_of_the_definition_are_those_of_the_program() {
+fn defined_ranges_match_the_program() {
     let tables = tables();
     let keys = || tables.iter().flat_map(|table| table.keys.iter().map(move |key| (table, key)));
     let wrong: Vec<String> = keys().filter_map(|(table, key)| table.wrong_range(key)).collect();
@@ -285,7 +285,7 @@ fn the_ranges_of_the_definition_are_those_of_the_program() {
 }
 
 #[test]
-fn the_words_of_the_definition_are_those_of_the_program() {
+fn defined_choices_match_the_program() {
     let mut count = 0;
     for table in tables() {
         for key in &table.keys {

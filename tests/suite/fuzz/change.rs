@@ -1,13 +1,13 @@
-//! Ways to change a file.
+//! Random changes to a file.
 
 use std::ops::Range;
 
 use super::random::Random;
 
-/// Longest result: longer ones only take longer.
+/// Longest result: longer files only take more time.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Words that make programs stumble.
+/// Words that break careless parsers.
 const WORDS: &[&str] = &[
     "0",
     "-1",
@@ -116,7 +116,7 @@ const EDGES: &[u64] = &[
     0xffff_ffff_ffff_ffff,
 ];
 
-/// One to five changes, one after another.
+/// Applies one to five changes in sequence.
 pub(super) fn changed(bytes: &[u8], other: &[u8], random: &mut Random) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(5) {
@@ -157,7 +157,7 @@ fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     }
 }
 
-/// A position, more often near the start, which holds headers.
+/// A random position, more often near the start, where headers are.
 fn place(bytes: &[u8], random: &mut Random) -> usize {
     let within = if random.below(2) == 0 { bytes.len().min(256) } else { bytes.len() };
     random.below(within)
@@ -179,7 +179,7 @@ fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     }
 }
 
-/// Sets a number of 1, 2, 4 or 8 bytes in either order.
+/// Writes a number of 1, 2, 4 or 8 bytes in either byte order.
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let (at, length) = (place(bytes, random), 1 << random.below(4));
@@ -227,7 +227,7 @@ fn delete_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
 fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let line = random.pick(&lines(bytes)).clone();
     let text = [b"\n", &bytes[line.clone()]].concat();
-    // No more of a long line than is kept: the worker's memory is watched.
+    // Do not repeat long lines beyond the limit: the worker's memory is measured.
     let times = (1 << random.below(12)).min(MOST_BYTES / text.len() + 1);
     bytes.splice(line.end..line.end, text.repeat(times));
 }
@@ -256,7 +256,7 @@ fn replace_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     bytes.splice(word, random.pick(WORDS).bytes());
 }
 
-/// Gives a word that begins like a number more digits, or another sign.
+/// Gives a word that starts like a number more digits or the other sign.
 fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let mut numbers = words(bytes);
     numbers.retain(|word| bytes.get(word.start).is_some_and(|byte| byte.is_ascii_digit() || *byte == b'-'));
@@ -278,7 +278,7 @@ fn insert_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     bytes.splice(word.end..word.end, text.into_bytes());
 }
 
-/// Inserts bytes that are not UTF-8, or not text at all.
+/// Inserts bytes that are not valid UTF-8.
 fn insert_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let at = place(bytes, random);
     let new: Vec<u8> = (0..=random.below(16)).map(|_| random.next() as u8 | 0x80).collect();
@@ -313,7 +313,7 @@ fn delete_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     bytes.drain(part);
 }
 
-/// Joins the start of one file and the end of another.
+/// Joins the start of one file with the end of another.
 fn splice(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     bytes.truncate(random.below(bytes.len()) + 1);
     if !other.is_empty() {

@@ -31,7 +31,7 @@ enum Kind {
     Asset,
 }
 
-/// One file to be checked.
+/// One file to check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Case {
     kind: Kind,
@@ -57,7 +57,7 @@ impl Material {
         Self { scenes: scenes(), assets: assets() }
     }
 
-    /// The changed file of a case, under the name of its original.
+    /// The changed file of a case, named like its original.
     fn make(&self, case: Case) -> Seed {
         let seeds = match case.kind {
             Kind::Scene => &self.scenes,
@@ -70,7 +70,7 @@ impl Material {
     }
 }
 
-/// Numbers of scenes, of assets, and of each kind for the program itself.
+/// Numbers of scenes, of assets, and of files of each kind that the program checks.
 fn counts() -> [u64; 3] {
     let asked = std::env::var("GLIMT_FUZZ_CASES").unwrap_or_else(|_| "250,250,15".to_owned());
     let numbers: Vec<u64> =
@@ -82,7 +82,7 @@ fn seed() -> u64 {
     std::env::var("GLIMT_FUZZ_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
 }
 
-/// Keeps the files of failed cases, and reports their folder.
+/// Writes the files of failed cases to a folder, and reports it.
 fn settle(failures: &[(Case, String)]) {
     if failures.is_empty() {
         return;
@@ -101,17 +101,17 @@ fn settle(failures: &[(Case, String)]) {
 }
 
 #[test]
-fn changed_scenes_are_checked_or_refused() {
+fn changed_scenes_are_checked_or_rejected() {
     settle(&worker::check_all(Kind::Scene, seed(), counts()[0]));
 }
 
 #[test]
-fn changed_assets_are_checked_or_refused() {
+fn changed_assets_are_checked_or_rejected() {
     settle(&worker::check_all(Kind::Asset, seed(), counts()[1]));
 }
 
 #[test]
-fn the_program_ends_with_0_or_2() {
+fn check_exits_with_0_or_2() {
     let [_, _, count] = counts();
     settle(
         &[program::check_all(Kind::Scene, seed(), count), program::check_all(Kind::Asset, seed(), count)]
@@ -120,7 +120,7 @@ fn the_program_ends_with_0_or_2() {
 }
 
 #[test]
-fn the_same_seed_makes_the_same_files() {
+fn same_seed_gives_the_same_files() {
     let (one, other) = (Material::new(), Material::new());
     let mut changed = 0;
     for number in 0..100 {

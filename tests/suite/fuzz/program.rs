@@ -1,4 +1,4 @@
-//! `glimt check` from outside.
+//! `glimt check` as a process.
 
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
@@ -7,13 +7,13 @@ use super::worker::{AT_MOST, CaseDir, TRIES, harmful};
 use super::{Case, Kind, Material};
 use crate::test_dir::PROGRAM;
 
-/// The cases of a kind that failed, with the reason.
+/// The failed cases of a kind, with the reason for each.
 pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
     let dir = CaseDir::new();
     let material = Material::new();
     let cases = (0..count).map(|number| Case { kind, seed, number });
     let check = |case: Case| {
-        let scene = dir.lay(case, &material.make(case));
+        let scene = dir.place_case(case, &material.make(case));
         let run = || run(Command::new(PROGRAM).arg("check").arg(&scene));
         let Some(output) = (0..TRIES).find_map(|_| run()) else {
             return Some((case, "it takes more than 2 s".to_owned()));
@@ -32,7 +32,7 @@ fn run(command: &mut Command) -> Option<Output> {
     let waiting = std::thread::spawn(move || send.send(child.wait_with_output()));
     let output = output.recv_timeout(AT_MOST).ok().map(|output| output.expect("its output"));
     if output.is_none() {
-        // Nobody has waited for it yet, so the number is still its own.
+        // The child has not been waited for, so its id cannot have been reused.
         let _ = nix::sys::signal::kill(process, nix::sys::signal::Signal::SIGKILL);
     }
     let _ = waiting.join();
@@ -41,13 +41,13 @@ fn run(command: &mut Command) -> Option<Output> {
 
 fn judge(output: &Output) -> Result<(), String> {
     let code = output.status.code();
-    let stderr = String::from_utf8(output.stderr.clone()).map_err(|_| "stderr is no UTF-8".to_owned())?;
+    let stderr = String::from_utf8(output.stderr.clone()).map_err(|_| "stderr is not UTF-8".to_owned())?;
     if code != Some(0) && code != Some(2) {
         return Err(format!("{}: {stderr}", output.status));
     }
     if code == Some(2) && !stderr.contains("error") {
-        return Err(format!("refused without a reason: {stderr}"));
+        return Err(format!("rejected without a reason: {stderr}"));
     }
     let said = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr;
-    harmful(&said).map_or(Ok(()), |harmful| Err(format!("the message has {harmful:?}")))
+    harmful(&said).map_or(Ok(()), |harmful| Err(format!("the message contains {harmful:?}")))
 }

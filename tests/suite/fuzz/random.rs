@@ -1,10 +1,10 @@
-//! Random numbers that are the same everywhere.
+//! Reproducible random numbers.
 
 /// SplitMix64 (Steele, Lea, Flood, *Fast Splittable Pseudorandom Number Generators*, 2014).
 pub(super) struct Random(u64);
 
 impl Random {
-    /// A stream for each pair.
+    /// Creates a separate stream for each pair.
     pub(super) fn new(seed: u64, number: u64) -> Self {
         let mut start = Self(seed);
         let mut random = Self(start.next() ^ number);
@@ -19,7 +19,7 @@ impl Random {
         mixed ^ mixed >> 31
     }
 
-    /// A number below the limit, which is above 0.
+    /// A number below `limit`, which must not be 0.
     pub(super) fn below(&mut self, limit: usize) -> usize {
         ((u128::from(self.next()) * limit as u128) >> 64) as usize
     }

@@ -1,4 +1,4 @@
-//! `check` by the library in worker processes, so that a stack overflow, a hang and too much memory are noticed.
+//! Runs `check` in worker processes, so that a stack overflow, a hang or excessive memory use is detected.
 
 use std::io::{BufRead, BufReader, Write};
 use std::panic::{self, AssertUnwindSafe};
@@ -16,36 +16,36 @@ use nix::sys::resource::{Resource, setrlimit};
 use super::seeds::{Seed, root};
 use super::{Case, Kind, Material};
 
-/// Longest time of a case.
+/// Time limit for a case.
 pub(super) const AT_MOST: Duration = Duration::from_secs(2);
 
-/// Longest wait until a case is made; only a stalled machine takes so long.
+/// Time limit for generating a case; only a stalled machine takes this long.
 const TO_BEGIN: Duration = Duration::from_secs(120);
 
-/// Number of times that a slow case is tried again, alone, as the machine may be busy.
+/// Number of times that a slow case is retried on its own, because the machine may be busy.
 pub(super) const TRIES: usize = 3;
 
-/// Most memory in use, a worker's own included. The largest that a small file may claim and get is an image, whose
-/// pixels are allocated before the file turns out to be too short.
+/// Limit of resident memory, including the worker's own. The most that a small file can claim and get is an image,
+/// whose pixels are allocated before the file turns out to be too short.
 const MEMORY_BYTES: u64 = 768 << 20;
 
-/// Most memory that may be requested.
+/// Limit of memory that may be requested.
 const ADDRESS_BYTES: u64 = 16 << 30;
 
-/// Processes at work.
-const PACKET_SIZE: u64 = 2;
+/// Number of worker processes.
+const WORKERS: u64 = 2;
 
 /// Environment variable that makes a process of this test a worker, and names its cases.
 const ORDER: &str = "GLIMT_FUZZ_WORKER";
 
-/// The cases of a kind that failed, with the reason.
+/// The failed cases of a kind, with the reason for each.
 pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
     let failures = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
-        for lane in 0..PACKET_SIZE {
+        for worker in 0..WORKERS {
             let failures = &failures;
             scope.spawn(move || {
-                let numbers = count * lane / PACKET_SIZE..count * (lane + 1) / PACKET_SIZE;
+                let numbers = count * worker / WORKERS..count * (worker + 1) / WORKERS;
                 let mut next = numbers.start;
                 while next < numbers.end {
                     let first = Case { kind, seed, number: next };
@@ -69,7 +69,7 @@ pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)
 /// Message for a case that takes too long.
 const SLOW: &str = "it takes more than 2 s";
 
-/// Lets a worker do the cases from this one up to a number; the error is the first failure.
+/// Lets a worker process the cases from this one up to a number; the error is the first failure.
 fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     let Case { kind, seed, number } = first;
     let mut worker = Command::new(std::env::current_exe().expect("this program"))
@@ -89,7 +89,7 @@ fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
             break;
         }
     }
-    // It may have ended by itself.
+    // The worker may have ended already.
     let _ = worker.kill();
     let status = worker.wait().expect("its end");
     result.map_err(
@@ -105,7 +105,7 @@ fn lines_of(worker: &mut Child) -> Receiver<String> {
     let output = BufReader::new(worker.stdout.take().expect("its stdout"));
     std::thread::spawn(move || {
         for line in output.lines().map_while(Result::ok) {
-            // Lines of the test harness have no mark.
+            // Lines of the test harness have no marker.
             if let Some(line) = line.strip_prefix("@ ")
                 && send.send(line.to_owned()).is_err()
             {
@@ -116,7 +116,7 @@ fn lines_of(worker: &mut Child) -> Receiver<String> {
     lines
 }
 
-/// Waits for a result. The worker makes a case in its own time; from then on the time counts.
+/// Waits for a result. The time limit starts when the worker has generated the case.
 fn next_result(lines: &Receiver<String>) -> Result<(), String> {
     let next = |at_most: Duration| match lines.recv_timeout(at_most) {
         Ok(line) => Ok(line),
@@ -128,7 +128,7 @@ fn next_result(lines: &Receiver<String>) -> Result<(), String> {
     if said == "right" { Ok(()) } else { Err(said) }
 }
 
-/// Runs the ordered cases; does nothing without an order.
+/// Runs the requested cases; does nothing unless this process is a worker.
 #[test]
 fn worker() {
     let Ok(order) = std::env::var(ORDER) else { return };
@@ -141,7 +141,7 @@ fn worker() {
     listen_to_panics(&dir);
     for number in from..to {
         let case = Case { kind, seed, number };
-        let scene = dir.lay(case, &material.make(case));
+        let scene = dir.place_case(case, &material.make(case));
         say("begin");
         let said = one(&scene).map_or_else(|reason| reason.replace('\n', " "), |()| "right".to_owned());
         say(&said);
@@ -156,10 +156,11 @@ fn say(text: &str) {
 /// The last panic, wherever it was caught.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Installs a hook that hears all panics: the library silences panics that it contains, from its first work on.
+/// Installs a hook that records all panics. The library silences the panics it contains once it has been used, so use
+/// it first.
 fn listen_to_panics(dir: &CaseDir) {
     let _ = check(
-        &dir.lay(
+        &dir.place_case(
             Case { kind: Kind::Asset, seed: 0, number: 0 },
             &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
         ),
@@ -174,7 +175,7 @@ fn listen_to_panics(dir: &CaseDir) {
 fn one(scene: &Path) -> Result<(), String> {
     let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene, &[])));
     if let Some(panic) = PANIC.lock().expect("no panic").take() {
-        // Decoders of other crates may panic: the library contains it as an error of the file.
+        // Decoders in other crates may panic: the library turns that into an error about the file.
         let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");
         if checked.is_err() || !is_foreign {
             return Err(format!("a panic: {panic}"));
@@ -183,35 +184,35 @@ fn one(scene: &Path) -> Result<(), String> {
     let diagnostics = match checked {
         Ok(Ok(checked)) => checked.warnings,
         Ok(Err(Failure::Scene(diagnostics))) if diagnostics.is_empty() => {
-            return Err("refused without a reason".to_owned());
+            return Err("rejected without a reason".to_owned());
         }
         Ok(Err(Failure::Scene(diagnostics))) => diagnostics,
         Ok(Err(Failure::Work(message))) => return Err(format!("exit code 1: {message}")),
-        Err(_) => return Err("a panic without a message".to_owned()),
+        Err(_) => return Err("panic without a message".to_owned()),
     };
     let text = render(&diagnostics, 60, Style::Plain);
     if let Some(harmful) = harmful(&text) {
-        return Err(format!("the message has {harmful:?}"));
+        return Err(format!("the message contains {harmful:?}"));
     }
     let used = peak_memory_bytes();
     if used > MEMORY_BYTES { Err(format!("it takes {} MiB of memory", used >> 20)) } else { Ok(()) }
 }
 
-/// Peak memory of this program; getrusage(2) would add that of the process while it was still its parent's copy.
+/// Peak memory of this program. getrusage(2) would include the parent's memory from before exec.
 fn peak_memory_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB"));
     peak.and_then(|kibibytes| kibibytes.trim().parse::<u64>().ok()).map_or(0, |kibibytes| kibibytes * 1024)
 }
 
-/// A character that a terminal would act on.
+/// A character that a terminal would interpret.
 pub(super) fn harmful(text: &str) -> Option<char> {
     text.chars().find(|c| (c.is_control() && *c != '\n') || ('\u{202a}'..='\u{202e}').contains(c))
 }
 
 const MTL: &str = "newmtl red\nKd 1 0 0\n";
 
-/// A folder with all that scenes may name.
+/// A folder with all files that the scenes may name.
 pub(super) struct CaseDir(tempfile::TempDir);
 
 impl CaseDir {
@@ -228,12 +229,12 @@ impl CaseDir {
         Self(folder)
     }
 
-    /// Puts the file of a case in its place; returns the scene to check.
-    pub(super) fn lay(&self, case: Case, made: &Seed) -> PathBuf {
+    /// Writes the file of a case where scenes expect it; returns the scene to check.
+    pub(super) fn place_case(&self, case: Case, made: &Seed) -> PathBuf {
         let folder = self.0.path().join("scenes");
         let scene = folder.join("case.toml");
         if ["case.glb", "case.gltf"].contains(&made.file.as_str()) {
-            // A model is shown alone, which reads more of it than a scene does.
+            // Check a model on its own, which reads more of it than a scene does.
             std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
             return folder.join(&made.file);
         }

@@ -1,4 +1,4 @@
-//! The schema of scenes, in both drafts: it takes what the program takes, and finds mistakes at their places.
+//! The schema of scenes, in both drafts: it accepts the same scenes as the program, and locates mistakes.
 
 mod validator;
 
@@ -18,7 +18,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// A text of TOML as JSON. `None` if it is broken.
+/// A TOML text as JSON. `None` if it is malformed.
 fn json(text: &str) -> Option<Value> {
     fn of(value: toml::Value) -> Value {
         match value {
@@ -50,7 +50,7 @@ fn files(folder: &str) -> Vec<PathBuf> {
 }
 
 #[test]
-fn the_schema_beside_the_scenes_is_the_programs() {
+fn bundled_schema_is_current() {
     let path = root().join("scenes").join(FILE);
     let there = fs::read_to_string(&path).unwrap_or_default();
     assert!(there == text(Draft::Four), "glimt schema > scenes/{FILE}");
@@ -61,13 +61,13 @@ fn the_schema_beside_the_scenes_is_the_programs() {
 }
 
 #[test]
-fn every_bundled_scene_and_the_starter_are_valid() {
+fn bundled_scenes_and_starter_are_valid() {
     for path in files("scenes") {
         let text = fs::read_to_string(&path).expect("a scene");
         assert_eq!(found(&text), [[], []], "{}", path.display());
     }
     assert_eq!(found(starter()), [[], []]);
-    // With every key that may be there beside the others.
+    // With every key that may appear together with the others.
     let stands_alone = ["orbiter", "matrix", "image", "opacity"];
     let uncommented = |line: &str| match line.strip_prefix("# ") {
         Some(text)
@@ -87,7 +87,7 @@ fn every_bundled_scene_and_the_starter_are_valid() {
 const SCENE: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
 #[test]
-fn mistakes_are_found_where_they_stand() {
+fn mistakes_are_located() {
     for (line, place) in [
         ("[render]\nwidth = 0", "render.width"),
         ("[render]\nsamples = 2.5", "render.samples"),
@@ -128,7 +128,7 @@ fn mistakes_are_found_where_they_stand() {
 }
 
 #[test]
-fn what_excludes_another_is_a_mistake() {
+fn exclusive_keys_are_a_mistake() {
     for wrong in [
         "[render]",
         "[camera]\nposition = [0, 1, 4]",
@@ -143,9 +143,9 @@ fn what_excludes_another_is_a_mistake() {
     assert_eq!(found("[camera]\norbiter = \"a.txt\"\nfov = 30"), [[], []]);
 }
 
-/// A scene without errors for the program is one for the schema too, as far as whole files show it.
+/// A scene that the program accepts is valid for the schema, if it can be checked on its own.
 #[test]
-fn nothing_is_a_mistake_that_the_program_takes() {
+fn schema_accepts_what_the_program_accepts() {
     let mut count = 0;
     for path in files("tests/broken") {
         let text = fs::read_to_string(&path).expect("a file");
@@ -156,18 +156,18 @@ fn nothing_is_a_mistake_that_the_program_takes() {
         }
         count += 1;
     }
-    assert!(count >= 3, "{count} files with warnings alone");
+    assert!(count >= 3, "{count} files with only warnings");
 }
 
 #[test]
-fn a_new_scene_may_have_its_schema_beside_it() {
+fn new_writes_the_schema() {
     let dir = TestDir::new();
     dir.expect("new --schema first.toml", 0);
     let scene = String::from_utf8(dir.bytes("first.toml")).expect("UTF-8");
     assert_eq!(scene, format!("{LINE}{}", starter()));
     assert_eq!(String::from_utf8(dir.bytes(FILE)).expect("UTF-8"), text(Draft::Four));
     assert!(dir.run("check first.toml").status.success());
-    // The same schema will do for another scene; another file of that name stays.
+    // The same schema serves another scene; a different file of that name is kept.
     dir.expect("new --schema second.toml", 0);
     dir.write(FILE, "mine");
     assert!(
@@ -175,7 +175,7 @@ fn a_new_scene_may_have_its_schema_beside_it() {
             .contains("glimt.schema.json is not the schema of this glimt, and is left")
     );
     assert!(!dir.path("third.toml").exists() && dir.bytes(FILE) == b"mine");
-    // A scene that is there already gets none.
+    // An existing scene gets no schema.
     let other = TestDir::new();
     other.write("there.toml", "mine");
     assert!(other.expect("new --schema there.toml", 2).contains("exists already"));

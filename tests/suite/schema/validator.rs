@@ -1,8 +1,8 @@
-//! A validator of the part of JSON Schema that the schema of scenes uses. `.ci/editors.py` asks those that people have.
+//! A validator for the part of JSON Schema that the scene schema uses. `.ci/editors.py` runs widely used validators.
 
 use serde_json::{Map, Value};
 
-/// The paths of values that are not as a schema has them, as in `sphere.0.radius`, each with the keyword that says so.
+/// The paths of invalid values, such as `sphere.0.radius`, each with the keyword it violates.
 pub(super) fn faults(schema: &Value, value: &Value) -> Vec<(String, String)> {
     let mut found = Vec::new();
     check(schema, schema, value, "", &mut found);
@@ -15,7 +15,7 @@ fn is_valid(root: &Value, schema: &Value, value: &Value) -> bool {
     found.is_empty()
 }
 
-/// Checks a value against a schema within the whole one, `root`.
+/// Checks a value against a subschema of the schema `root`.
 fn check(root: &Value, schema: &Value, value: &Value, path: &str, found: &mut Vec<(String, String)>) {
     let Value::Object(keywords) = schema else { return };
     if let Some(Value::String(reference)) = keywords.get("$ref") {
@@ -30,7 +30,7 @@ fn check(root: &Value, schema: &Value, value: &Value, path: &str, found: &mut Ve
     }
 }
 
-/// Whether a value is as one keyword has it, what lies inside aside.
+/// Whether a value satisfies a keyword, ignoring nested values.
 fn holds(
     root: &Value,
     keyword: &str,
@@ -156,8 +156,8 @@ fn is_of_type(name: &str, value: &Value) -> bool {
     }
 }
 
-/// Whether a text fits one of the forms of patterns that there are: `[^0-9]`, `\.(one|other)$` and `^(one|other)$`, where letters
-/// stand in both cases as in `[Pp]`.
+/// Whether a text matches one of the patterns in use: `[^0-9]`, `\.(one|other)$` and `^(one|other)$`, where `[Pp]`
+/// matches a letter in both cases.
 fn matches(pattern: &str, text: &str) -> bool {
     if pattern == "[^0-9]" {
         return text.chars().any(|c| !c.is_ascii_digit());

@@ -118,7 +118,7 @@ fn each_terminal_gets_what_it_is_known_to_have_and_loses_it_at_the_end() {
         check(b"\x1b]9;4;1;", has_what.progress);
         check(has_what.notice, true);
         check(b"\x1b]8;;file://", has_what.links);
-        // The address, then perhaps a colour, then the name.
+        // The address, then perhaps a color, then the name.
         let address = b"/scene.png\x1b\\";
         let name = place(&bytes, address).map(|start| &bytes[start + address.len()..][..24]);
         assert_eq!(name.is_some_and(|name| has(name, b"scene.png")), has_what.links, "{variables:?}: a link");

@@ -345,7 +345,7 @@ impl Terminal {
         });
     }
 
-    /// Waits for the picture to be of this colour.
+    /// Waits for the picture to be of this color.
     #[track_caller]
     pub fn wait_for_color(&self, name: &str) {
         self.wait(name, |screen| {
@@ -403,12 +403,12 @@ pub struct Colors {
 }
 
 impl Colors {
-    /// Colours of the upper halves of cells.
+    /// Colors of the upper halves of cells.
     pub fn of(screen: &vt100::Screen) -> Self {
         let mut colors = Self::default();
         for color in cells(screen).filter_map(upper) {
             let vt100::Color::Rgb(r, g, b) = color else { continue };
-            // Compare far from the colours of edges: the last bits of a colour depend on the cell's history.
+            // Compare far from the colors of edges: the last bits of a color depend on the cell's history.
             let above = |a: u8, b: u8, c: u8| a > 50 && a / 2 > b.max(c);
             colors.red += usize::from(above(r, g, b));
             colors.green += usize::from(above(g, r, b));
@@ -425,7 +425,7 @@ impl Colors {
         self.most() == Some(name)
     }
 
-    /// The colour of nearly all of them, if they are enough for a picture.
+    /// The color of nearly all of them, if they are enough for a picture.
     fn most(&self) -> Option<&'static str> {
         let total = self.total();
         let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];
@@ -433,7 +433,7 @@ impl Colors {
     }
 }
 
-/// The colour of a cell's upper half, however it is drawn.
+/// The color of a cell's upper half, however it is drawn.
 pub fn upper(cell: &vt100::Cell) -> Option<vt100::Color> {
     match cell.contents() {
         "▀" | "█" => Some(cell.fgcolor()),

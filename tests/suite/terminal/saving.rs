@@ -53,7 +53,7 @@ fn beside(path: &Path, ending: &str) -> std::path::PathBuf {
     name.into()
 }
 
-/// Two colours in turns, by which one can see which save is shown.
+/// Two colors in turns, by which one can see which save is shown.
 fn shades() -> impl Iterator<Item = (&'static str, &'static str)> {
     [("green", GREEN), ("blue", BLUE)].into_iter().cycle()
 }
@@ -96,7 +96,7 @@ fn every_way_of_saving_an_asset_renders_once() {
     }
 }
 
-/// No error is on the screen until a render of this colour is.
+/// No error is on the screen until a render of this color is.
 #[track_caller]
 fn no_error_until(terminal: &Terminal, color: &'static str, render: usize) {
     terminal.wait(color, |screen| {

@@ -18,7 +18,7 @@ fn beside(screen: &vt100::Screen, column: usize) -> String {
     rows.collect::<Vec<_>>().join(" ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Cells of each colour from a column on.
+/// Cells of each color from a column on.
 fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     let (_, columns) = screen.size();
     let mut count = [0; 3];
@@ -37,7 +37,7 @@ fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     count
 }
 
-/// Three saves, each in another colour.
+/// Three saves, each in another color.
 fn edited(folder: &Folder, terminal: &Terminal) {
     terminal.wait_for_render(1);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
@@ -63,7 +63,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
             && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
             && beside.contains("1 first")
     });
-    // A picture of each colour, the newest at the top.
+    // A picture of each color, the newest at the top.
     let colors = terminal.settled(|screen| colors_from(screen, PANEL));
     assert!(colors.iter().all(|count| *count >= 3), "{colors:?}");
     let row_of = |text: &str| {

@@ -36,7 +36,7 @@ fn after_a_typo_b_shows_the_picture_before_the_last_edit_that_is_seen() {
     terminal.wait_for_color("blue");
 }
 
-/// Cells of a picture that is found again differ from those of its render if colours are mixed.
+/// Cells of a picture that is found again differ from those of its render if colors are mixed.
 #[test]
 fn in_256_colours_a_comment_and_a_typo_add_no_picture() {
     let folder = Folder::new();
