@@ -7,6 +7,7 @@ use super::order::Trouble;
 use super::results::ReferenceResult;
 use crate::compare::{Pair, TwoReferences};
 use crate::control::CancelToken;
+use crate::pipeline::BUILD;
 use crate::pipeline::session::{Rendered, Session};
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::Integrator;
@@ -100,14 +101,8 @@ pub(super) struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Key of the references. Those with samples that the call sets have another key than those that time made.
-    fn key(&self, Keys(keys): &Keys) -> Key {
-        let mut key = Fingerprint::new("references");
-        key.text(env!("CARGO_PKG_VERSION")).u64(self.asked.unwrap_or(0).into());
-        keys.iter().for_each(|one| {
-            key.key(one);
-        });
-        key.finish()
+    fn key(&self, keys: &Keys) -> Key {
+        cache_key(BUILD, self.asked, keys)
     }
 
     /// Pictures of one sample show what the references depend on, and that everything can be read.
@@ -168,6 +163,17 @@ impl Maker<'_> {
     }
 }
 
+/// Key of the references in the cache. Builds that may render other bits do not share references, and references with samples that
+/// the call sets differ from timed ones.
+fn cache_key(build: &str, asked: Option<u32>, Keys(keys): &Keys) -> Key {
+    let mut key = Fingerprint::new("references");
+    key.text(build).u64(asked.unwrap_or(0).into());
+    keys.iter().for_each(|one| {
+        key.key(one);
+    });
+    key.finish()
+}
+
 fn reference(
     stored: Stored,
     is_cached: bool,
@@ -189,6 +195,23 @@ fn reference(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn builds_share_no_references() {
+        let keys = || Keys(["a", "b"].map(|name| Fingerprint::new(name).finish()));
+        let (common, token) = (Overrides::default(), CancelToken::new());
+        let maker = Maker {
+            scene: Path::new("a.toml"),
+            common: &common,
+            token: &token,
+            cache: None,
+            asked: Some(2),
+        };
+        let other = BUILD.replace("(build ", "(build 0");
+        assert_ne!(maker.key(&keys()), cache_key(&other, maker.asked, &keys()));
+        assert_ne!(maker.key(&keys()), cache_key(env!("CARGO_PKG_VERSION"), maker.asked, &keys()));
+        assert_eq!(maker.key(&keys()), cache_key(BUILD, maker.asked, &keys()));
+    }
 
     #[test]
     fn references_stand_for_a_hundredth_of_their_samples() {
