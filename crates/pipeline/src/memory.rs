@@ -25,11 +25,14 @@ const KEPT_MAPS: u64 = 128 << 20;
 const MOST_FRAMES: u64 = 4 << 30;
 /// Name of the frames among the parts.
 const FRAMES: &str = "the frames";
+/// Name of the own image's film among the parts.
+const OWN_FILM: &str = "the unfinished film of the scene's own image";
 
 /// A part of the memory, by its name.
 type Item = (&'static str, u64);
 
 /// Memory of a render, as far as it is known.
+#[derive(Clone)]
 pub(super) struct Foretold(Vec<Item>);
 
 impl Foretold {
@@ -72,21 +75,31 @@ impl Foretold {
         Self(items)
     }
 
+    /// The same with the film of the scene's own image, which is kept while keys show something else.
+    pub(super) fn with_own_film(mut self, bytes: u64) -> Self {
+        self.0.push((OWN_FILM, bytes));
+        self
+    }
+
     /// Bytes of all parts.
     pub(super) fn bytes(&self) -> u64 {
         self.0.iter().fold(0, |sum: u64, (_, bytes)| sum.saturating_add(*bytes))
     }
 
-    /// Refuses what takes more than the call, or else the system, allows.
+    fn own_film(&self) -> u64 {
+        self.0.iter().filter(|(name, _)| *name == OWN_FILM).map(|(_, bytes)| bytes).sum()
+    }
+
+    /// Refuses what takes more than the call, or else the system, allows. Returns the bytes that are left.
     ///
     /// # Errors
     /// The work would need more, with the numbers and a way out.
-    pub(super) fn check(&self, plan: &Plan) -> Result<(), Stop> {
+    pub(super) fn check(&self, plan: &Plan) -> Result<u64, Stop> {
         self.check_within(plan, limit)
     }
 
     /// [`Self::check`] where the system has this limit.
-    fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<(), Stop> {
+    fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MOST_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
@@ -99,14 +112,16 @@ impl Foretold {
         }
         // A size that the call names counts in place of the system's: the estimate is on the safe side.
         let limit = plan.memory.map(|bytes| Limit { bytes, setting: "--memory".to_owned() }).or_else(limit);
-        let Some(Limit { bytes: most, setting }) = limit.filter(|limit| all > limit.bytes) else {
-            return Ok(());
-        };
+        let Some(Limit { bytes: most, setting }) = limit else { return Ok(u64::MAX) };
+        if all <= most {
+            return Ok(most - all);
+        }
         let mut largest = self.0.clone();
         largest.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
         let items = largest.iter().filter(|(_, bytes)| *bytes * 100 > all);
         let items: Vec<String> = items.map(|(name, bytes)| format!("{name} {}", words(*bytes))).collect();
         let way_out = match largest.first() {
+            _ if all - self.own_film() <= most => "go back to the scene's own settings, or let its image be finished first",
             Some(("the film" | "the picture", _)) => "render a smaller picture, or parts of it by --crop",
             Some(("the layers", _)) => "ask for fewer layers or a smaller picture",
             Some((FRAMES, _)) => "render fewer or smaller frames, or a file each, as in a_####.png",

@@ -108,6 +108,8 @@ pub(super) struct Engine {
     films: FilmCache,
     written: Written,
     own: Option<OwnImage>,
+    /// Whether the film of the own image stays, whatever else is rendered.
+    pins_own: bool,
     /// Whether the plan of the current film is that of the scene's own image.
     is_own: bool,
     /// Report of the newest request, once it is finished.
@@ -173,6 +175,7 @@ impl Engine {
             films: FilmCache::default(),
             written: Written::default(),
             own: None,
+            pins_own: true,
             is_own: true,
             report: None,
             frames: Frames::default(),
@@ -421,7 +424,7 @@ impl Engine {
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let own_plan = own_plan(request, &parsed)?;
-        Foretold::of_picture(&plan).check(&plan)?;
+        self.check_memory(&Foretold::of_picture(&plan), request, (&plan, own_plan.as_ref()))?;
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
@@ -453,7 +456,8 @@ impl Engine {
         if let Some(path) = contents.changed() {
             return Err(Stop::work(format!("{} changed while it was read", path.display())));
         }
-        Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).check(&plan)?;
+        let foretold = Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
+        self.check_memory(&foretold, request, (&plan, own_plan.as_ref()))?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;

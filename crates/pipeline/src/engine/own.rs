@@ -9,9 +9,11 @@ use crate::assembly::Eye;
 use crate::control::CancelToken;
 use crate::identity::Depends;
 use crate::keys;
+use crate::memory::Foretold;
 use crate::output::part::Trait;
 use crate::plan::{Plan, plan};
 use crate::protocol::{Failure, OwnState, Request, Status, Writing};
+use crate::render::film_state::FilmState;
 use crate::render::keeping::{Around, Keeping};
 use crate::render::share::Share;
 use crate::scene::description::CameraChange;
@@ -78,11 +80,44 @@ fn image_key(film: Key, plan: &Plan) -> Key {
 impl Engine {
     /// Takes up the scene's own image of a request. Its film stays, whatever else is rendered.
     pub(super) fn take_own(&mut self, mut own: OwnImage) {
-        self.films.pin(own.film);
+        if self.pins_own {
+            self.films.pin(own.film);
+        }
         if let Some(before) = self.own.take().filter(|before| before.film == own.film) {
             own.share = before.share;
         }
         self.own = Some(own);
+    }
+
+    /// Checks the memory of a request. If keys show something else, the film of the scene's own image counts. Where it does not fit
+    /// beside theirs, it makes room once its image is written.
+    ///
+    /// # Errors
+    /// The request needs more than there is.
+    pub(super) fn check_memory(
+        &mut self,
+        foretold: &Foretold,
+        request: &Request,
+        plans: (&Plan, Option<&Plan>),
+    ) -> Result<(), Stop> {
+        let (plan, bytes) = (plans.0, self.own_film_bytes(request, plans));
+        let all = foretold.clone().with_own_film(bytes).check(plan);
+        self.pins_own = all.is_ok() || !self.is_own_written();
+        let room = if self.pins_own { all? } else { foretold.check(plan)? };
+        if !self.pins_own {
+            self.films.unpin();
+        }
+        self.films.limit(room);
+        Ok(())
+    }
+
+    /// Bytes of the film that stays for the scene's own image beside the film of a request.
+    fn own_film_bytes(&self, request: &Request, (plan, own_plan): (&Plan, Option<&Plan>)) -> u64 {
+        let (Some(own), Some(own_plan)) = (&self.own, own_plan) else { return 0 };
+        let of = |plan: &Plan| keys::render(own.film, &plan.settings, plan.crop);
+        let is_shared = of(plan) == of(own_plan) && request.overrides.camera == overrides(request).camera;
+        let canvas = self.films.of(own.film).filter(|canvas| canvas.is_begun() && !is_shared);
+        canvas.map_or(0, FilmState::memory_bytes)
     }
 
     /// Notes the share of the scene's own image, if the request is of it.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::own::{lookups, own_plan};
 use super::{Engine, Meanwhile};
+use crate::memory::Foretold;
 use crate::plan::plan;
 use crate::protocol::{Event, LastGoodEnd, Request, Status};
 use crate::sink::Sink;
@@ -64,6 +65,8 @@ impl Engine {
         let reading = Reading { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
         let lookups = lookups(&plan, own.as_ref());
         let good = self.with_textures(good, lookups, &reading)?;
+        let foretold = Foretold::of_scene(&plan, &plan.scene, &good.meshes, good.textures.memory_bytes);
+        self.check_memory(&foretold, &request, (&plan, own.as_ref()))?;
         // Make it ready: all that did not change is kept from before.
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: true };
         let ready = self.build(&request, &good, (plan, own), &mut table, &reading)?;

@@ -44,6 +44,18 @@ impl FilmCache {
         self.pinned = Some(key);
     }
 
+    /// Pins no film from now on.
+    pub(crate) fn unpin(&mut self) {
+        self.pinned = None;
+    }
+
+    /// Drops films until the others fit into so many bytes, as films that are kept from now on must. The current film and the pinned
+    /// one do not count.
+    pub(crate) fn limit(&mut self, bytes: u64) {
+        self.most_kept_bytes = bytes.min(MOST_KEPT_BYTES);
+        self.make_room(0);
+    }
+
     /// Makes the film of this key the current one, if it is kept and of use; else there is no current film. Keeps the film
     /// before, if there is room.
     pub(crate) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {

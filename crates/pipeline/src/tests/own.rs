@@ -223,3 +223,53 @@ fn the_checkpoint_of_the_own_render_is_kept_when_keys_show_something_else_at_the
     assert!(keys.0.worker.end_within(Duration::from_secs(60)));
     assert!(!keys.0.path("out.ppm.checkpoint").exists());
 }
+
+/// Bytes that a render of the scene needs with these overrides.
+fn needed(keys: &Keys, overrides: &Overrides) -> u64 {
+    crate::check::memory_needed(&keys.0.path("scene.toml"), overrides).expect("a scene")
+}
+
+#[test]
+fn memory_counts_the_unfinished_own_film() {
+    let film = 40 * 30 * 40;
+    for (more, fits) in [(film / 2, false), (2 * film, true)] {
+        let mut keys = Keys::with(slow);
+        keys.0.overrides.samples = Some(64);
+        keys.0.overrides.memory = Some(needed(&keys, &keys.0.overrides) + more);
+        begin(&mut keys);
+        // The same film in another way takes no more memory.
+        let stops = |keys: &mut Keys, change: fn(&mut Overrides)| {
+            let of = keys.show(change);
+            let begins = |event: &Event| matches!(event, Event::Progress { generation, .. } if *generation == of);
+            loop {
+                match keys.0.next() {
+                    Event::Failed { generation, failure } if generation == of => return Some(failure),
+                    event if begins(&event) => return None,
+                    _ => {}
+                }
+            }
+        };
+        assert!(stops(&mut keys, |overrides| overrides.exposure = Some(1.0)).is_none());
+        let failure = stops(&mut keys, no_shadows);
+        assert_eq!(matches!(failure, Some(Failure::Work(_))), !fits, "{failure:?}");
+        // Back at the scene's own settings, its render continues.
+        let (report, _) = keys.0.done();
+        assert!(report.stages[Stage::Render as usize].why.starts_with("went on after"), "{report:?}");
+    }
+}
+
+#[test]
+fn a_written_own_film_makes_room() {
+    let film = 40 * 30 * 40;
+    for (more, stays) in [(film / 2, false), (2 * film, true)] {
+        let mut keys = Keys::new();
+        keys.0.overrides.memory = Some(needed(&keys, &keys.0.overrides) + more);
+        keys.0.done();
+        let own = keys.0.picture();
+        assert_eq!(states(&keys.shown(no_shadows)), [OwnState::Written; 2]);
+        assert!(keys.0.picture() == own);
+        let (report, _) = keys.0.done();
+        assert_statuses(&report, if stays { "rrrrrsrr" } else { "rrrrrsdr" });
+        assert!(keys.0.picture() == own);
+    }
+}
