@@ -291,7 +291,7 @@ impl Merge<'_> {
         parts: &[PartFile],
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
-        name_scene(&mut finish, out);
+        name_scene(&mut finish, parts, out);
         let film = &merged.film;
         let may_replace = |real: &Path| {
             let is_given = self.args.parts.iter().any(|part| is_one_file(part, real));
@@ -324,12 +324,15 @@ impl Merge<'_> {
     }
 }
 
-/// Records the scene's path as a render in that folder does. Parts hold only its file name, because they come from many folders.
-fn name_scene(finish: &mut Finish, out: &Path) {
+/// Records the scene's path as a single render does: relative to the image. Looks for the scene where the parts say it is, then beside
+/// the image.
+fn name_scene(finish: &mut Finish, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
-    let beside = out.with_file_name(scene.as_str());
-    if !scene.contains('/') && beside.is_file() {
-        *scene = scene_path::relative(&beside, out);
+    let named = parts.iter().filter(|part| !part.head.scene.is_empty());
+    let named = named.map(|part| part.path.with_file_name(&part.head.scene));
+    let found = named.chain([out.with_file_name(scene.as_str())]).find(|path| path.is_file());
+    if let Some(path) = found {
+        *scene = scene_path::relative(&path, out);
     }
 }
 

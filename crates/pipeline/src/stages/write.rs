@@ -20,7 +20,7 @@ use crate::control::CancelToken;
 use crate::film::tone::develop;
 use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{AovSource, LightAov};
-use crate::output::part::{self, Kind};
+use crate::output::part::{self, Head, Kind};
 use crate::output::write::{Durability, Guard};
 use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError, scene_path};
 use crate::output::{MovingFormat, moving};
@@ -288,7 +288,9 @@ fn write_part(
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let head = head(Kind::Part, canvas, canvas.identity.clone().unwrap_or_default(), &finish(plan));
+    let identity = canvas.identity.clone().unwrap_or_default();
+    let scene = scene_path::relative(&plan.path, path);
+    let head = Head { scene, ..head(Kind::Part, canvas, identity, &finish(plan)) };
     let save = |guard: &Guard<'_>| {
         part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };

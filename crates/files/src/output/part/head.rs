@@ -21,6 +21,9 @@ pub struct Head {
     pub share: ShareHead,
     /// The picture.
     pub picture: PictureHead,
+    /// Path of the scene, relative to the part. Empty if it is unknown. Parts of one picture may differ in it.
+    #[serde(default)]
+    pub scene: String,
 }
 
 /// Kind of a file.

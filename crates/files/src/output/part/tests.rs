@@ -39,6 +39,7 @@ fn head(index: u32, count: u32, film: &Film) -> Head {
         identity: vec![Trait::setting("seed", "7"), Trait::file("knot.obj", "12ab"), Trait::everything("ff")],
         share: ShareHead { index, count, block_count: 0, blocks: Vec::new() },
         picture: PictureHead::new(film, &finish()),
+        scene: String::new(),
     }
 }
 

@@ -35,7 +35,7 @@ const ENDING: &str = ".checkpoint";
 /// The head of a film's file.
 pub(crate) fn head(kind: Kind, state: &FilmState, identity: Vec<Trait>, finish: &Finish) -> Head {
     let share = share_head(state.share.as_ref());
-    Head { kind, identity, share, picture: PictureHead::new(&state.film, finish) }
+    Head { kind, identity, share, picture: PictureHead::new(&state.film, finish), scene: String::new() }
 }
 
 fn share_head(share: Option<&Share>) -> ShareHead {
@@ -173,7 +173,8 @@ impl<'a> Keeping<'a> {
             }
         };
         let mut differences = self.unlike(&file.head, state);
-        if differences.is_empty() && file.head != self.head(Kind::Part, state) {
+        let head = Head { scene: file.head.scene.clone(), ..self.head(Kind::Part, state) };
+        if differences.is_empty() && file.head != head {
             differences.push("the picture is finished in another way".to_owned());
         }
         let refused = |error: PartError| {
