@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Picture;
 use glimt::pipeline::protocol::PreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{Advice, Fidelity, Moment, Painter, advise};
+use glimt::tui::paint::{PacingAdvice, Fidelity, FrameTiming, Painter, advise};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -160,7 +160,7 @@ impl Window {
         let (mut bytes, mut pictures) = (first_bytes, 1);
         let (mut aimed, mut at) = (first.samples, first.seconds);
         for shot in &shots[1..] {
-            let moment = Moment {
+            let moment = FrameTiming {
                 bytes_per_second: None,
                 cells: cells as u32,
                 samples: shot.samples,
@@ -172,7 +172,7 @@ impl Window {
                 is_final: shot.is_final,
                 final_in: None,
             };
-            if let Advice::Aim(fidelity) = advise(&moment) {
+            if let PacingAdvice::Aim(fidelity) = advise(&moment) {
                 (aimed, at) = (shot.samples, shot.seconds);
                 bytes += self.aim(&shot.picture, fidelity);
                 pictures += 1;
