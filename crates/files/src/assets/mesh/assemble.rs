@@ -16,7 +16,16 @@ use crate::math::{DVec3, Vec2, Vec3};
 const BATCH: usize = 1 << 14;
 
 /// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
-pub(crate) fn assemble(source: &Source<'_>, mut parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+pub(crate) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+    assemble_text(source, parsed, |_| None)
+}
+
+/// [`assemble`] for a file with lines. `start_of` returns the offset of a face, counted from 0.
+pub(super) fn assemble_text(
+    source: &Source<'_>,
+    mut parsed: Parsed,
+    start_of: impl Fn(usize) -> Option<usize>,
+) -> Result<LoadedMesh, AssetError> {
     corners::split(&mut parsed, source.watch.token)?;
     let Parsed {
         positions,
@@ -44,7 +53,8 @@ pub(crate) fn assemble(source: &Source<'_>, mut parsed: Parsed) -> Result<Loaded
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
     cutter.cut_all(source, &faces)?;
     let Cutter { triangles, triangle_materials, dropped, crossing, .. } = cutter;
-    warnings.extend(crossing_faces(crossing));
+    let line_of = |face: usize| start_of(face).map(|start| source.line(start));
+    warnings.extend(crossing_faces(crossing, line_of));
     if triangles.is_empty() {
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
@@ -94,13 +104,17 @@ fn no_usable_face(faces: usize, dropped: Dropped) -> String {
 }
 
 /// The warning of polygons that cross themselves.
-fn crossing_faces((count, first): (u64, usize)) -> Option<String> {
-    let number = first + 1;
+fn crossing_faces((count, first): (u64, usize), line_of: impl Fn(usize) -> Option<usize>) -> Option<String> {
+    let first_face = || match line_of(first) {
+        Some(line) => format!("line {line}: face {}", first + 1),
+        None => format!("face {}", first + 1),
+    };
     match count {
         0 => None,
-        1 => Some(format!("face {number} crosses itself: its triangles may overlap")),
+        1 => Some(format!("{} crosses itself: its triangles may overlap", first_face())),
         _ => Some(format!(
-            "face {number} and {} more cross themselves: their triangles may overlap",
+            "{} and {} more cross themselves: their triangles may overlap",
+            first_face(),
             count - 1
         )),
     }

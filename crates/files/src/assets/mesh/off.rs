@@ -2,7 +2,7 @@
 //! counts behind the header word, no edge count, undeclared columns behind coordinates and faces, comments and blank
 //! lines anywhere.
 
-use super::assemble::assemble;
+use super::assemble::assemble_text;
 use super::parsed::{ColorRange, Parsed};
 use super::text::{Cursor, shown};
 use super::{AssetError, LoadedMesh, Source};
@@ -26,6 +26,7 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     Reader { source: *source, cursor: Cursor::new(source.bytes, 0), excess, indices }.read()
 }
 
+#[derive(Clone, Copy)]
 struct Reader<'a> {
     source: Source<'a>,
     cursor: Cursor<'a>,
@@ -61,7 +62,8 @@ impl Lines {
 struct Colors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
-    least_alpha: Option<f64>,
+    /// The least alpha, and a byte of its line.
+    least_alpha: Option<(f64, usize)>,
 }
 
 impl Colors {
@@ -71,17 +73,20 @@ impl Colors {
         self.all.extend(std::iter::repeat_n(color, times));
     }
 
-    fn alpha(&mut self, alpha: f64) {
-        self.least_alpha = Some(self.least_alpha.map_or(alpha, |least| least.min(alpha)));
+    fn alpha(&mut self, alpha: f64, at: usize) {
+        if self.least_alpha.is_none_or(|(least, _)| alpha < least) {
+            self.least_alpha = Some((alpha, at));
+        }
     }
 
     /// All colors in bytes, white where there is none; empty if there are none at all.
-    fn finish(self, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    fn finish(self, source: &Source<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
         }
-        if self.least_alpha.is_some_and(|least| least < self.range.one()) {
-            warnings.push("the alpha of the colors is ignored".to_owned());
+        if let Some((_, at)) = self.least_alpha.filter(|(least, _)| *least < self.range.one()) {
+            let line = source.line(at);
+            warnings.push(format!("line {line}: the alpha of the colors is ignored"));
         }
         let bytes = |color: Option<[f64; 3]>| color.map_or([u8::MAX; 3], |color| self.range.bytes(color));
         self.all.into_iter().map(bytes).collect()
@@ -97,8 +102,9 @@ impl Reader<'_> {
         self.plausible(vertices, faces)?;
         let mut parsed = Parsed::default();
         self.vertices(header, vertices, &mut parsed)?;
+        let before_faces = self;
         let colors = self.faces(vertices, faces, &mut parsed)?;
-        let own_colors = colors.finish(&mut parsed.warnings);
+        let own_colors = colors.finish(&self.source, &mut parsed.warnings);
         if parsed.colors.is_empty() {
             parsed.corner_colors = own_colors;
         } else if !own_colors.is_empty() {
@@ -108,7 +114,15 @@ impl Reader<'_> {
         parsed
             .warnings
             .extend(self.indices.warning(&self.source, "an index into a colormap that is elsewhere"));
-        assemble(&self.source, parsed)
+        assemble_text(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
+    }
+
+    /// Offset of a face, counted from 0, for a reader at the first one.
+    fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
+        let mut ahead = *self;
+        ahead.faces(vertices, face as u64, &mut Parsed::default()).ok()?;
+        ahead.cursor.skip_blank();
+        Some(ahead.cursor.at())
     }
 
     fn wrong<T>(&self, reason: impl Into<String>) -> Result<T, AssetError> {
@@ -245,7 +259,7 @@ impl Reader<'_> {
             }
             self.cursor.end_line();
         }
-        parsed.colors = colors.finish(&mut parsed.warnings);
+        parsed.colors = colors.finish(&self.source, &mut parsed.warnings);
         Ok(())
     }
 
@@ -253,7 +267,7 @@ impl Reader<'_> {
     fn color(&mut self, color: &[f64], times: usize, colors: &mut Colors) {
         colors.push(color, times);
         match color {
-            [_, _, _, alpha] => colors.alpha(*alpha),
+            [_, _, _, alpha] => colors.alpha(*alpha, self.cursor.at()),
             [_] => self.indices.add(self.cursor.at()),
             [] | [_, _, _] => {}
             [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.at()),
@@ -437,8 +451,9 @@ mod tests {
         assert_eq!(off(["", ""]), (vec![], vec![]));
         let index = "line 7 has an index into a colormap that is elsewhere: ignored";
         assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index.to_owned()]));
-        let faded = vec!["the alpha of the colors is ignored".to_owned()];
-        assert_eq!(off(["1 0 0 0.5", "0 1 0"]), ([[red; 3], [green; 3]].concat(), faded));
+        let (colors, faded) = off(["1 0 0", "0 1 0 0.5"]);
+        assert_eq!((colors, faded.len()), ([[red; 3], [green; 3]].concat(), 1));
+        assert!(faded[0].starts_with("line 8: "), "{faded:?}");
         let more = "line 7 and 1 more have more numbers than the header names: ignored";
         assert_eq!(off(["1 2", "1 0 0 1 7"]), ([[white; 3], [red; 3]].concat(), vec![more.to_owned()]));
         let vertices = "the colors of the faces are ignored: the vertices have colors";
@@ -446,6 +461,14 @@ mod tests {
             of_faces("COFF", " 0 255 0", ["255 0 0", "255 0 0"]),
             (vec![green; 6], vec![vertices.to_owned()])
         );
+    }
+
+    #[test]
+    fn a_face_that_crosses_itself_has_a_line() {
+        let text = "OFF 4 3\n0 0 0\n3 0 0\n0 1 0\n3 2 0\n3 0 1 2 # x\n\n4 0 1 3\n2 255 0 0\n4 0 1 2 3\n";
+        let warnings = read(text).expect("whole").warnings;
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].starts_with("line 10: face 3 "), "{warnings:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! zero or wrong, keywords in any case. Normals are those of the corners' order; corners at one place become one vertex. The format
 //! has no unit and no colours.
 
-use super::assemble::assemble;
+use super::assemble::{assemble, assemble_text};
 use super::parsed::{Faces, Parsed};
 use super::text::{Cursor, shown, with_line_feeds};
 use super::{AssetError, LoadedMesh, Source};
@@ -23,16 +23,16 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     if !fits_claim(source.bytes) {
         read::refuse_utf16(source.path, source.bytes)?;
     }
-    let mut parsed = match kind(source.bytes) {
+    match kind(source.bytes) {
         Kind::Text => {
             let bytes = with_line_feeds(source.bytes);
             let source = Source { bytes: &bytes, ..*source };
-            Text { source, cursor: Cursor::new(source.bytes, 0) }.read()?
+            let mut text = Text { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
+            let parsed = Parsed { has_corners_apart: true, ..text.read()? };
+            assemble_text(&source, parsed, |face| text.start_of(face))
         }
-        Kind::Binary => binary(source)?,
-    };
-    parsed.has_corners_apart = true;
-    assemble(source, parsed)
+        Kind::Binary => assemble(source, Parsed { has_corners_apart: true, ..binary(source)? }),
+    }
 }
 
 /// How a file is written.
@@ -114,12 +114,20 @@ fn add(parsed: &mut Parsed, position: DVec3) {
 struct Text<'a> {
     source: Source<'a>,
     cursor: Cursor<'a>,
+    /// Faces of more than 3 corners, and the offsets of their loops.
+    polygons: Vec<(usize, usize)>,
 }
 
 impl Text<'_> {
-    fn read(mut self) -> Result<Parsed, AssetError> {
+    /// Offset of a face of more than 3 corners.
+    fn start_of(&self, face: usize) -> Option<usize> {
+        self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
+    }
+
+    fn read(&mut self) -> Result<Parsed, AssetError> {
         let mut parsed = Parsed::default();
         let mut corners: Option<usize> = None;
+        let (mut loop_start, mut faces) = (0, 0);
         let mut words = 0;
         while self.cursor.skip_blank() {
             if words % BATCH == 0 {
@@ -137,12 +145,19 @@ impl Text<'_> {
                 let position = DVec3::new(self.float()?, self.float()?, self.float()?);
                 add(&mut parsed, position);
             } else if is("loop") {
+                loop_start = start.at();
                 if corners.replace(0).is_some() {
                     return self.wrong(start, "a loop in a loop");
                 }
             } else if is("endloop") {
                 match corners.take() {
-                    Some(count) if count >= 3 => parsed.faces.close(count),
+                    Some(count) if count >= 3 => {
+                        if count > 3 {
+                            self.polygons.push((faces, loop_start));
+                        }
+                        faces += 1;
+                        parsed.faces.close(count);
+                    }
                     Some(count) => return self.wrong(start, format!("a loop of {count} corners")),
                     None => return self.wrong(start, "\"endloop\" without \"outer loop\""),
                 }
@@ -335,6 +350,22 @@ mod tests {
         let square = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
         let loaded = read(format!("{square}{}", square.replace(" 0\n", " 3\n")).as_bytes()).expect("read");
         assert_eq!((loaded.mesh.triangles.len(), loaded.mesh.positions.len()), (4, 8));
+    }
+
+    #[test]
+    fn a_facet_that_crosses_itself_has_a_line() {
+        let facet = |corners: &[&str]| {
+            let vertices: Vec<_> = corners.iter().map(|corner| format!("vertex {corner}\n")).collect();
+            format!("facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n", vertices.concat())
+        };
+        let plain = facet(&["0 0 0", "1 0 0", "1 1 0", "0 1 0"]);
+        let crossed = facet(&["0 0 0", "3 0 0", "0 1 0", "3 2 0"]);
+        for end in ["\n", "\r\n", "\r"] {
+            let text = format!("solid a\n{plain}{crossed}endsolid a\n").replace('\n', end);
+            let warnings = read(text.as_bytes()).expect("read").warnings;
+            assert_eq!(warnings.len(), 1);
+            assert!(warnings[0].starts_with("line 11: face 2 "), "{warnings:?}");
+        }
     }
 
     #[test]

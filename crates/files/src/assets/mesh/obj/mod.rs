@@ -9,7 +9,7 @@ mod words;
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::assemble::assemble;
+use super::assemble::assemble_text;
 use super::parsed::Parsed;
 use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, Source};
@@ -37,7 +37,7 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     build(&statements, &runs, &mut parsed);
     parsed.warnings.extend(gaps(source, &statements, &runs));
     drop(statements);
-    assemble(source, parsed)
+    assemble_text(source, parsed, |face| Some(face_start(source, face)))
 }
 
 /// The materials of an OBJ.

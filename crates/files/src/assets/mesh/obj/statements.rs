@@ -35,6 +35,17 @@ pub(super) enum Change {
     Smoothing(Smoothing),
 }
 
+/// Letters of the longest keyword that is read.
+const LONGEST: usize = 6;
+
+/// A keyword in lower case. A longer word than any keyword is returned as it is.
+fn lower_case<'a>(word: &'a [u8], lower: &'a mut [u8; LONGEST]) -> &'a [u8] {
+    let Some(lower) = lower.get_mut(..word.len()) else { return word };
+    lower.copy_from_slice(word);
+    lower.make_ascii_lowercase();
+    lower
+}
+
 /// Everything in the file that is used.
 #[derive(Default)]
 pub(super) struct Statements {
@@ -80,7 +91,8 @@ impl Statements {
             }
             return Ok(());
         };
-        match keyword {
+        let mut lower = [0; LONGEST];
+        match lower_case(keyword, &mut lower) {
             b"v" => self.vertices.read(words)?,
             b"vt" => {
                 let [u, v, _] = numbers(words, 1, 2, "texture coordinates")?;
@@ -184,8 +196,9 @@ impl Statements {
             self.warnings
                 .push(format!("line {line}: a vertex has more than coordinates and a color: ignored"));
         }
-        if self.vertices.has_alpha() {
-            self.warnings.push("the alpha of the vertex colors is ignored".to_owned());
+        if let Some(start) = self.vertices.translucent() {
+            let line = source.line(start);
+            self.warnings.push(format!("line {line}: the alpha of the vertex colors is ignored"));
         }
         if let Some((start, keyword)) = &self.free_form {
             let line = source.line(*start);
@@ -201,7 +214,7 @@ pub(super) fn face_start(source: &Source<'_>, face: usize) -> usize {
     let mut faces = 0;
     while words.next_statement() {
         let start = words.at();
-        if words.word() == Some(b"f") {
+        if words.word().is_some_and(|word| word.eq_ignore_ascii_case(b"f")) {
             if faces == face {
                 return start;
             }

@@ -192,8 +192,35 @@ fn colors_follow_coordinates_in_every_dialect() {
     let ignored = vec!["line 1: a vertex has more than coordinates and a color: ignored".to_owned()];
     assert_eq!(colors(["a b c", "a b c", "a b c"]), (vec![], ignored.clone()));
     assert_eq!(colors(["1 0 0 1 1 1", "0 0.2 0", ""]), (plain.to_vec(), ignored));
-    let faded = vec!["the alpha of the vertex colors is ignored".to_owned()];
-    assert_eq!(colors(["1 0 0 1", "0 0.2 0 0.5", "1 1 1 1"]), (plain.to_vec(), faded));
+    let faded = vec!["line 2: the alpha of the vertex colors is ignored".to_owned()];
+    assert_eq!(colors(["1 0 0 1", "0 0.2 0 0.5", "1 1 1 1"]), (plain.to_vec(), faded.clone()));
+    // Alpha has the range of the colors.
+    assert_eq!(colors(["255 0 0 255", "0 51 0 128", "255 255 255 255"]), (plain.to_vec(), faded));
+    assert_eq!(colors(["255 0 0 255", "0 51 0 255", "255 255 255 255"]), (plain.to_vec(), vec![]));
+}
+
+#[test]
+fn keywords_in_capitals_are_read() {
+    let text = "MTLLIB a.mtl\nV 0 0 0\nv 1 0 0\nV 0 1 0\nV 1 1 0\nVT 0.5 0\nVN 0 0 1\nS OFF\nG a\nUSEMTL m\n\
+        F 1/1/1 2/1/1 3/1/1\nUseMtl m\nf 1/1/1 4/1/1 3/1/1\nSURF 0 1\n";
+    let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", b"NEWMTL m\nKD 1 0 0\n")]).expect("whole");
+    let lower = read_with(&[
+        ("a.obj", text.to_lowercase().as_bytes()),
+        ("a.mtl", b"newmtl m\nKd 1 0 0\n".as_slice()),
+    ]);
+    let lower = lower.expect("whole");
+    assert_eq!(loaded.mesh, lower.mesh);
+    assert_eq!((loaded.materials.len(), loaded.warnings.len()), (1, 1));
+    // The line of a fault is found among faces in capitals.
+    assert!(says("V 0 0 0\nF 1 1 1\nF 1 2 3\n").starts_with(":3: "));
+}
+
+#[test]
+fn a_face_that_crosses_itself_has_a_line() {
+    let text = format!("{SQUARE}f 1 2 3\nf 1 2 3 4\n# x\nF 1 3 \\\n 2 4\n");
+    let loaded = read(&format!("{text}f 1 2 3\n")).expect("whole");
+    assert_eq!(loaded.warnings.len(), 1);
+    assert!(loaded.warnings[0].starts_with("line 8: face 3 "), "{:?}", loaded.warnings);
 }
 
 #[test]

@@ -14,8 +14,8 @@ pub(super) struct Vertices {
     range: ColorRange,
     /// Colors in ZBrush's comments `#MRGB`, in the order of the positions.
     painted: Vec<[u8; 3]>,
-    /// Whether some vertex has an alpha below 1.
-    has_alpha: bool,
+    /// The least alpha, and the offset of its statement.
+    least_alpha: Option<(f64, usize)>,
     /// Offset of the first statement with words that are not used.
     pub(super) first_excess: Option<usize>,
 }
@@ -41,15 +41,15 @@ impl Vertices {
         let [x, y, z, rest @ ..] = numbers;
         let (weight, color, alpha) = match (count, rest) {
             (0..3, _) => return Err(format!("expected 3 coordinates, found {count}")),
-            (3, _) => (1.0, None, 1.0),
-            (4, [weight, ..]) => (weight, None, 1.0),
+            (3, _) => (1.0, None, None),
+            (4, [weight, ..]) => (weight, None, None),
             (5, _) => return Err("coordinates are followed by one weight or three colors".to_owned()),
-            (6, [r, g, b, ..]) => (1.0, Some([r, g, b]), 1.0),
-            (7, [r, g, b, alpha, _]) => (1.0, Some([r, g, b]), alpha),
-            (8, [weight, r, g, b, alpha]) => (weight, Some([r, g, b]), alpha),
+            (6, [r, g, b, ..]) => (1.0, Some([r, g, b]), None),
+            (7, [r, g, b, alpha, _]) => (1.0, Some([r, g, b]), Some(alpha)),
+            (8, [weight, r, g, b, alpha]) => (weight, Some([r, g, b]), Some(alpha)),
             (_, [r, g, b, ..]) => {
                 self.first_excess.get_or_insert(start);
-                (1.0, Some([r, g, b]), 1.0)
+                (1.0, Some([r, g, b]), None)
             }
         };
         if weight == 0.0 {
@@ -57,7 +57,11 @@ impl Vertices {
         }
         if let Some(color) = color {
             self.color(color)?;
-            self.has_alpha |= alpha < 1.0;
+        }
+        if let Some(alpha) = alpha
+            && self.least_alpha.is_none_or(|(least, _)| alpha < least)
+        {
+            self.least_alpha = Some((alpha, start));
         }
         self.positions.push(DVec3::new(x, y, z) / weight);
         Ok(())
@@ -90,9 +94,9 @@ impl Vertices {
         !self.colors.is_empty() || !self.painted.is_empty()
     }
 
-    /// Whether the colors have an alpha, which is ignored.
-    pub(super) fn has_alpha(&self) -> bool {
-        self.has_alpha
+    /// Offset of the vertex with the least alpha, if that is below 1. Alpha has the range of the colors.
+    pub(super) fn translucent(&self) -> Option<usize> {
+        self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 
     /// The color of a position; white if it has none.

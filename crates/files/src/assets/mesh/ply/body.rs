@@ -4,7 +4,7 @@ use super::super::text::{Cursor, shown};
 use super::header::Scalar;
 
 /// Numbers in the order of the file. Errors are in words, without the place.
-pub(super) trait Numbers {
+pub(super) trait Numbers: Clone {
     fn float(&mut self, scalar: Scalar) -> Result<f64, String>;
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
@@ -15,14 +15,21 @@ pub(super) trait Numbers {
     /// Byte of the file.
     fn at(&self) -> usize;
 
+    /// Byte of the next number.
+    fn start(&self) -> usize {
+        self.at()
+    }
+
     /// Whether the rest of the file can hold so many numbers.
     fn can_hold(&self, scalar: Scalar, count: u64) -> bool;
 }
 
 /// Words between blanks.
+#[derive(Clone)]
 pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) Lines);
 
 /// Meaning of the ends of lines.
+#[derive(Clone, Copy)]
 pub(super) enum Lines {
     /// They are blanks.
     Blank,
@@ -70,12 +77,19 @@ impl Numbers for Ascii<'_> {
         self.0.at()
     }
 
+    fn start(&self) -> usize {
+        let mut ahead = self.0;
+        ahead.skip_blank();
+        ahead.at()
+    }
+
     fn can_hold(&self, _: Scalar, count: u64) -> bool {
         count.saturating_mul(2) <= self.0.remaining() as u64 + 1
     }
 }
 
 /// Bytes, the most significant first or last.
+#[derive(Clone)]
 pub(super) struct Binary<'a, const BIG_ENDIAN: bool> {
     pub(super) bytes: &'a [u8],
     pub(super) at: usize,

@@ -12,8 +12,8 @@ pub(super) struct Colors {
     /// All other colors.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
-    /// Least alpha and its type.
-    alpha: Option<(f64, Scalar)>,
+    /// Least alpha, its type, and the byte of its vertex.
+    alpha: Option<(f64, Scalar, usize)>,
 }
 
 impl Colors {
@@ -31,13 +31,14 @@ impl Colors {
         }
     }
 
-    pub(super) fn alpha(&mut self, alpha: f64, scalar: Scalar) {
-        let least = self.alpha.map_or(alpha, |(least, _)| least.min(alpha));
-        self.alpha = Some((least, scalar));
+    pub(super) fn alpha(&mut self, alpha: f64, scalar: Scalar, at: usize) {
+        if self.alpha.is_none_or(|(least, ..)| alpha < least) {
+            self.alpha = Some((alpha, scalar, at));
+        }
     }
 
-    /// The colors in bytes, and the warning of an alpha.
-    pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<String>) {
+    /// The colors in bytes, and the byte of a vertex whose alpha is below 1.
+    pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<usize>) {
         let one = |scalar: Scalar| match scalar {
             Scalar::U8 | Scalar::I8 => scalar.greatest(),
             Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
@@ -46,11 +47,10 @@ impl Colors {
             }
             Scalar::F32 | Scalar::F64 => self.range.one(),
         };
-        let is_seen_through = self.alpha.is_some_and(|(least, scalar)| least < one(scalar));
-        let warning = is_seen_through.then(|| "the alpha of the colors is ignored".to_owned());
+        let translucent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar)).map(|(.., at)| at);
         let ones = self.scalars.map(one);
         let in_bytes = |color: &[f64; 3]| color_bytes(std::array::from_fn(|part| color[part] / ones[part]));
         let colors = self.numbers.iter().map(in_bytes);
-        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, warning)
+        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, translucent)
     }
 }

@@ -199,9 +199,7 @@ impl Faces {
         }
         let Some(colors) = self.colors else { return };
         if parsed.colors.is_empty() {
-            let (colors, warning) = colors.finish();
-            parsed.corner_colors = colors;
-            parsed.warnings.extend(warning);
+            (parsed.corner_colors, _) = colors.finish();
         } else {
             parsed.warnings.push("the colors of the faces are ignored: the vertices have colors".to_owned());
         }

@@ -7,7 +7,7 @@ mod faces;
 mod header;
 pub mod write;
 
-use super::assemble::assemble;
+use super::assemble::assemble_text;
 use super::parsed::Parsed;
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, Source};
@@ -75,12 +75,17 @@ impl Place<'_> {
         }
     }
 
+    /// The line of a byte as the start of a message; nothing in binary files.
+    fn line(&self, at: usize) -> String {
+        match self.encoding {
+            Encoding::Ascii => format!("line {}: ", self.source.line(at)),
+            Encoding::LittleEndian | Encoding::BigEndian => String::new(),
+        }
+    }
+
     /// A face in words, with its line in a text.
     fn of_face(&self, at: usize, index: usize) -> String {
-        match self.encoding {
-            Encoding::Ascii => format!("line {}: face {}", self.source.line(at), index + 1),
-            Encoding::LittleEndian | Encoding::BigEndian => format!("face {}", index + 1),
-        }
+        format!("{}face {}", self.line(at), index + 1)
     }
 }
 
@@ -95,11 +100,15 @@ fn read(source: &Source<'_>, header: &Header, numbers: &mut impl Numbers) -> Res
     // Strips repeat what faces say, if there are faces.
     let has_faces = count_of("face") > 0;
     let mut parsed = Parsed { warnings: header.warning.iter().cloned().collect(), ..Parsed::default() };
+    let mut before_faces = None;
     for element in &header.elements {
         plausible(source, element, header.encoding, numbers.at())?;
         match element.name.as_str() {
             "vertex" => read_vertices(&place, element, numbers, &mut parsed)?,
-            "face" => read_faces(&place, element, numbers, vertices, &mut parsed)?,
+            "face" => {
+                before_faces.get_or_insert((element, numbers.clone()));
+                read_faces(&place, element, numbers, vertices, &mut parsed)?;
+            }
             "tristrips" if !has_faces => read_strips(&place, element, numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
             _ => each(&place, element, numbers, |numbers| {
@@ -107,7 +116,13 @@ fn read(source: &Source<'_>, header: &Header, numbers: &mut impl Numbers) -> Res
             })?,
         }
     }
-    assemble(source, parsed)
+    let start_of = |face: usize| {
+        let (element, mut numbers) = before_faces.clone().filter(|_| header.encoding == Encoding::Ascii)?;
+        let earlier = Element { count: face as u64, ..element.clone() };
+        read_faces(&place, &earlier, &mut numbers, vertices, &mut Parsed::default()).ok()?;
+        Some(numbers.start())
+    };
+    assemble_text(source, parsed, start_of)
 }
 
 /// Refuses a header that claims more than the file can hold, before anything is allocated.
@@ -241,15 +256,17 @@ fn read_vertices(
         if let Some(colors) = &mut colors {
             colors.push([red, green, blue]);
             if let Some(scalar) = alpha_scalar {
-                colors.alpha(alpha, scalar);
+                colors.alpha(alpha, scalar, numbers.at());
             }
         }
         Ok(())
     })?;
     if let Some(colors) = colors {
-        let (colors, warning) = colors.finish();
+        let (colors, translucent) = colors.finish();
         parsed.colors = colors;
-        parsed.warnings.extend(warning);
+        parsed
+            .warnings
+            .extend(translucent.map(|at| format!("{}the alpha of the colors is ignored", place.line(at))));
     }
     Ok(())
 }

@@ -386,6 +386,19 @@ fn vertex_colors_of_every_type_and_range() {
 }
 
 #[test]
+fn a_face_that_crosses_itself_has_a_line() {
+    let vertices = "0 0 0\n3 0 0\n0 1 0\n3 2 0\n";
+    let faces = FACE.replace("face 1", "face 3");
+    let header = format!("ply\nformat ascii 1.0\n{VERTEX}{faces}");
+    for (last, is_by_lines) in [("4 0 1 2 3", false), ("4 0 1 2 3 9", true)] {
+        let text = format!("{header}{vertices}3 0 1 2\n4 0 1 3 2\n{last}\n");
+        let warnings = read_bytes(text.as_bytes()).expect("whole").warnings;
+        assert_eq!(warnings.len(), 1 + usize::from(is_by_lines));
+        assert!(warnings[0].starts_with("line 16: face 3 "), "{warnings:?}");
+    }
+}
+
+#[test]
 fn an_alpha_below_one_is_warned_of() {
     let warnings = |scalar: &str, tail: &str| {
         let names = ["red", "green", "blue", "alpha"];
@@ -398,7 +411,9 @@ fn an_alpha_below_one_is_warned_of() {
         ("float", "9 9 9 255", "9 9 9 9"),
     ] {
         assert!(warnings(scalar, opaque).is_empty(), "{scalar} {opaque}");
-        assert_eq!(warnings(scalar, faded), ["the alpha of the colors is ignored"]);
+        let found = warnings(scalar, faded);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].starts_with("line 14: "), "{found:?}");
     }
 }
 
