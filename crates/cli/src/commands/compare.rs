@@ -34,6 +34,7 @@ fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Ex
         errors.iter().for_each(|error| console.say(&format!("error: {error}")));
         Exit::WRONG
     })?;
+    pair.warnings().iter().for_each(|warning| console.say(&format!("warning: {warning}")));
     warn_of_one_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;

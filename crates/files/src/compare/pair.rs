@@ -51,6 +51,7 @@ pub enum CompareError {
 pub struct Pair {
     a: RadianceImage,
     b: RadianceImage,
+    warnings: Vec<String>,
 }
 
 impl Pair {
@@ -61,7 +62,7 @@ impl Pair {
     pub fn new(names: [&Path; 2], a: RadianceImage, b: RadianceImage) -> Result<Self, Vec<CompareError>> {
         let errors = [check_finite(names[0], &a), check_finite(names[1], &b), check_sizes(names, &a, &b)];
         let errors: Vec<_> = errors.into_iter().flatten().collect();
-        if errors.is_empty() { Ok(Self { a, b }) } else { Err(errors) }
+        if errors.is_empty() { Ok(Self { a, b, warnings: Vec::new() }) } else { Err(errors) }
     }
 
     /// Reads two image files of any format that a texture may have: whole numbers are read as sRGB, floats as linear;
@@ -71,7 +72,11 @@ impl Pair {
     /// All faults of both.
     pub fn load(a: &Path, b: &Path) -> Result<Self, Vec<CompareError>> {
         match (read(a), read(b)) {
-            (Ok(first), Ok(second)) => Self::new([a, b], first, second),
+            (Ok((first, mut warnings)), Ok((second, more))) => {
+                warnings.extend(more);
+                warnings.dedup();
+                Ok(Self { warnings, ..Self::new([a, b], first, second)? })
+            }
             (first, second) => {
                 Err([first.err(), second.err()].into_iter().flatten().map(CompareError::from).collect())
             }
@@ -86,6 +91,11 @@ impl Pair {
     /// The reference.
     pub fn b(&self) -> &RadianceImage {
         &self.b
+    }
+
+    /// Warnings about parts of the files that are ignored.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// Columns of both.
@@ -105,12 +115,13 @@ impl Pair {
     }
 }
 
-fn read(path: &Path) -> Result<RadianceImage, AssetError> {
+/// Reads an image, with the warnings about it.
+fn read(path: &Path) -> Result<(RadianceImage, Vec<String>), AssetError> {
     let image =
         load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
     let texels = image.texels;
     let (width, height) = (texels.width, texels.height);
-    Ok(RadianceImage { width, height, pixels: texels.into_linear() })
+    Ok((RadianceImage { width, height, pixels: texels.into_linear() }, image.warnings))
 }
 
 fn check_finite(path: &Path, image: &RadianceImage) -> Option<CompareError> {

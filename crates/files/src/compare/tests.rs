@@ -19,6 +19,28 @@ fn errors(a: &RadianceImage, b: &RadianceImage) -> Errors {
     measure(&pair(a.clone(), b.clone())).errors
 }
 
+#[test]
+fn warnings_about_the_files_are_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [plain, animated] = ["a.png", "b.png"].map(|name| folder.path().join(name));
+    for (path, frames) in [(&plain, 1), (&animated, 3)] {
+        let file = std::fs::File::create(path).expect("created");
+        let mut encoder = png::Encoder::new(file, 1, 1);
+        if frames > 1 {
+            encoder.set_animated(frames, 0).expect("frames");
+        }
+        let mut writer = encoder.write_header().expect("a header");
+        (0..frames).for_each(|_| writer.write_image_data(&[9]).expect("written"));
+    }
+    let warnings = |a: &Path, b: &Path| Pair::load(a, b).expect("a pair").warnings().to_vec();
+    assert!(warnings(&plain, &plain).is_empty());
+    for (a, b) in [(&plain, &animated), (&animated, &plain), (&animated, &animated)] {
+        let found = warnings(a, b);
+        assert_eq!(found.len(), 1);
+        assert!(found[0].contains("b.png"), "{found:?}");
+    }
+}
+
 /// Hashed values in [0, 1] with noise of ±1/8, some of it outside of the range of a display.
 fn noisy(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| ((x * 7 + y * 13 + c * 29) * (x + 2 * y + 3) % 257) as f32 / 256.0;
