@@ -36,16 +36,17 @@ impl Chosen {
         }
     }
 
-    pub(super) fn chroma(self) -> Option<[Channel; 2]> {
+    /// Y, RY and BY.
+    pub(super) fn planes(self) -> Option<[Channel; 3]> {
         match self.color {
             Color::Rgb(_) | Color::Gray(_) => None,
-            Color::LuminanceChroma(_, chroma) => Some(chroma),
+            Color::LuminanceChroma(y, [ry, by]) => Some([y, ry, by]),
         }
     }
 
     /// All channels.
     pub(super) fn all(self) -> impl Iterator<Item = Channel> {
-        self.slots().into_iter().flatten().chain(self.chroma().into_iter().flatten())
+        self.slots().into_iter().flatten().chain(self.planes().into_iter().flatten())
     }
 }
 

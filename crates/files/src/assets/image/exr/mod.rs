@@ -1,6 +1,7 @@
 //! EXR by `exr`: `image` would only find red, green and blue without a layer's name.
 
 mod channels;
+mod chroma;
 mod sampling;
 
 use std::io::{BufRead, Seek};
@@ -18,8 +19,8 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 use super::facts::{Alpha, Facts};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
-use crate::math::DVec3;
 use channels::{Channel, Chosen, choose, no_color};
+use chroma::Planes;
 use sampling::{Sampling, Unpacking, Unsampled};
 
 /// Bytes of a sample.
@@ -46,7 +47,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         check_samplings(unpacking.headers(), channels).map_err(decoding_error)?;
         let needed = channels.all().map(|channel| block_bytes(&reader.headers()[channel.part])).max();
         let of_chroma =
-            channels.chroma().map_or(0, |chroma| Chroma::memory_bytes(unpacking.headers(), chroma));
+            channels.planes().map_or(0, |planes| Planes::memory_bytes(unpacking.headers(), planes));
         if needed.unwrap_or_default().saturating_add(of_chroma) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
         }
@@ -109,8 +110,8 @@ fn check_samplings(headers: &[Header], channels: Chosen) -> Result<(), String> {
             let name = &description(headers, channel).name;
             Err(format!("its channel {name} has a subsampling, which only RY and BY may have"))
         }
-        None => match channels.chroma() {
-            Some([ry, by]) if sampling(ry) != sampling(by) => {
+        None => match channels.planes() {
+            Some([_, ry, by]) if sampling(ry) != sampling(by) => {
                 Err("the subsampling of its channels RY and BY differs".to_owned())
             }
             Some(_) | None => Ok(()),
@@ -136,7 +137,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         let mut image = Image {
             headers: &headers,
             channels,
-            chroma: channels.chroma().map(|chroma| Chroma::new(&headers, chroma)),
+            planes: channels.planes().map(|planes| Planes::new(&headers, planes)),
         };
         samples.fill(0);
         let is_read = |part: usize| channels.all().any(|channel| channel.part == part);
@@ -160,7 +161,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
 struct Image<'a> {
     headers: &'a [Header],
     channels: Chosen,
-    chroma: Option<Chroma>,
+    planes: Option<Planes>,
 }
 
 impl Image<'_> {
@@ -181,8 +182,8 @@ impl Image<'_> {
                 data = rest;
                 let line = Line { kind: description.sample_type, bytes: line };
                 let channel = Channel { part, channel };
-                if let Some(chroma) = &mut self.chroma {
-                    chroma.add(channel, row / down, line);
+                if let Some(planes) = &mut self.planes {
+                    planes.add(channel, row / down, line);
                 }
                 self.place(channel, [left, row], line, samples);
             }
@@ -211,38 +212,30 @@ impl Image<'_> {
     }
 
     /// Makes colors of luminance and chroma.
-    fn add_chroma(&self, samples: &mut [u8]) {
-        let Some(chroma) = &self.chroma else { return };
-        let header = &self.headers[chroma.channels[0].part];
+    fn add_chroma(self, samples: &mut [u8]) {
+        let (Some([y, ..]), Some(planes)) = (self.channels.planes(), self.planes) else { return };
+        let header = &self.headers[y.part];
         let window = header.shared_attributes.display_window;
-        let Vec2(x, y) = window.position - header.own_attributes.layer_position;
         let weights = primaries(header).unwrap_or(Primaries::REC_709).luminance_weights();
         let Some(weights) = weights.or(Primaries::REC_709.luminance_weights()) else { return };
-        for (index, pixel) in samples.chunks_exact_mut(pixel_bytes(self.channels)).enumerate() {
-            let (column, row) = (index % window.size.width(), index / window.size.width());
-            let at = [column as i64 + i64::from(x), row as i64 + i64::from(y)];
-            let (Some([ry, by]), Some(bytes)) = (chroma.at(at), pixel.first_chunk()) else { continue };
-            let rgb = rgb(f32::from_ne_bytes(*bytes), [ry, by], weights);
-            let bytes = rgb.map(f32::to_ne_bytes);
-            pixel[..3 * SAMPLE_BYTES].copy_from_slice(bytes.as_flattened());
-        }
+        let offset = header.own_attributes.layer_position - window.position;
+        let (width, height) = (window.size.width() as i64, window.size.height() as i64);
+        let bytes = pixel_bytes(self.channels);
+        planes.colors(weights, |[x, y], color| {
+            let (x, y) = (x as i64 + i64::from(offset.x()), y as i64 + i64::from(offset.y()));
+            if !(0..width).contains(&x) || !(0..height).contains(&y) {
+                return;
+            }
+            let start = (y * width + x) as usize * bytes;
+            let color = color.map(f32::to_ne_bytes);
+            samples[start..][..3 * SAMPLE_BYTES].copy_from_slice(color.as_flattened());
+        });
     }
 }
 
 /// Bytes of a pixel of the image.
 fn pixel_bytes(channels: Chosen) -> usize {
     SAMPLE_BYTES * if channels.alpha.is_some() { 4 } else { 3 }
-}
-
-/// Red, green and blue of luminance and chroma; gray keeps its bits.
-fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
-    if ry == 0.0 && by == 0.0 {
-        return [luminance; 3];
-    }
-    let y = f64::from(luminance);
-    let (red, blue) = ((f64::from(ry) + 1.0) * y, (f64::from(by) + 1.0) * y);
-    let green = (y - red * weights.x - blue * weights.z) / weights.y;
-    [red as f32, green as f32, blue as f32]
 }
 
 /// Samples of one channel, side by side.
@@ -275,69 +268,6 @@ impl Line<'_> {
                 each(self.bytes, skipped, places, |at, bytes| put(at, u32::from_ne_bytes(bytes) as f32));
             }
         }
-    }
-}
-
-/// Planes of chroma, in the data window.
-struct Chroma {
-    channels: [Channel; 2],
-    sampling: Vec2<usize>,
-    /// Columns and rows of a plane.
-    size: Vec2<usize>,
-    planes: [Vec<f32>; 2],
-}
-
-impl Chroma {
-    fn new(headers: &[Header], channels: [Channel; 2]) -> Self {
-        let sampling = description(headers, channels[0]).sampling;
-        let size = headers[channels[0].part].layer_size / sampling;
-        Self { channels, sampling, size, planes: [vec![0.0; size.area()], vec![0.0; size.area()]] }
-    }
-
-    fn memory_bytes(headers: &[Header], channels: [Channel; 2]) -> u64 {
-        let size = headers[channels[0].part].layer_size / description(headers, channels[0]).sampling;
-        (size.width() as u64).saturating_mul(size.height() as u64).saturating_mul(2 * SAMPLE_BYTES as u64)
-    }
-
-    /// Adds a row, if it is of chroma.
-    fn add(&mut self, channel: Channel, row: usize, line: Line<'_>) {
-        let width = self.size.width();
-        for (plane, own) in self.planes.iter_mut().zip(self.channels) {
-            if let Some(row) = plane.chunks_exact_mut(width).nth(row).filter(|_| own == channel) {
-                line.values(0, row.iter_mut(), |place, value| *place = value);
-            }
-        }
-    }
-
-    /// Chroma of a pixel of the data window, interpolated between the pixels that have samples. `None` outside of the window.
-    fn at(&self, pixel: [i64; 2]) -> Option<[f32; 2]> {
-        let [x, y] = pixel.map(|at| usize::try_from(at).ok());
-        let column = Between::new(x?, self.sampling.x(), self.size.width())?;
-        let row = Between::new(y?, self.sampling.y(), self.size.height())?;
-        let value = |plane: &Vec<f32>, [row, column]: [usize; 2]| plane[row * self.size.width() + column];
-        Some([0, 1].map(|index| {
-            let plane = &self.planes[index];
-            let along = |row: usize| column.mean(|column| value(plane, [row, column]));
-            row.mean(along)
-        }))
-    }
-}
-
-/// Position between two samples; behind the last one, its value continues.
-struct Between {
-    samples: [usize; 2],
-    part: f32,
-}
-
-impl Between {
-    fn new(pixel: usize, step: usize, count: usize) -> Option<Self> {
-        let first = Some(pixel / step).filter(|first| *first < count)?;
-        Some(Self { samples: [first, (first + 1).min(count - 1)], part: (pixel % step) as f32 / step as f32 })
-    }
-
-    fn mean(&self, value: impl Fn(usize) -> f32) -> f32 {
-        let [low, high] = self.samples.map(value);
-        if self.part == 0.0 { low } else { low + (high - low) * self.part }
     }
 }
 

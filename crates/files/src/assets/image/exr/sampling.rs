@@ -4,7 +4,8 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use ::exr::block::UncompressedBlock;
-use ::exr::block::chunk::Chunk;
+use ::exr::block::chunk::{Chunk, CompressedBlock};
+use ::exr::compression::Compression;
 use ::exr::error::Error;
 use ::exr::meta::MetaData;
 use ::exr::meta::header::Header;
@@ -161,6 +162,16 @@ impl Unpacking {
         // `exr` expects the bytes of a pixel times the pixels.
         if !bytes.is_multiple_of(pixels.size.area()) {
             return Err(Error::NotSupported("this subsampling of its channels".into()));
+        }
+        let packed = match &chunk.compressed_block {
+            CompressedBlock::ScanLine(block) => block.compressed_pixels_le.len(),
+            CompressedBlock::Tile(block) => block.compressed_pixels_le.len(),
+            CompressedBlock::DeepScanLine(_) | CompressedBlock::DeepTile(_) => bytes,
+        };
+        // `exr` takes the subsampled channels of a B44 block for larger ones.
+        if matches!(header.compression, Compression::B44 | Compression::B44A) && packed != bytes {
+            let reason = "B44 compression of subsampled channels; save it with ZIP or PIZ";
+            return Err(Error::NotSupported(reason.into()));
         }
         self.0.headers[part].channels.bytes_per_pixel = bytes / pixels.size.area();
         UncompressedBlock::decompress_chunk(chunk, &self.0, false)

@@ -1,0 +1,169 @@
+//! Luminance and chroma → red, green and blue, as OpenEXR's `RgbaInputFile` converts them (Kainz and Bogart, *Technical
+//! Introduction to OpenEXR*, "Luminance/Chroma Images").
+
+use ::exr::meta::header::Header;
+use ::exr::prelude::Vec2;
+
+use super::channels::Channel;
+use super::{Line, SAMPLE_BYTES, description};
+use crate::math::DVec3;
+
+/// Weights of the samples on either side of a pixel without one, the nearest first (`ImfRgbaYca.cpp`).
+const WEIGHTS: [f32; 7] = [0.627_123, -0.186_077, 0.087_929, -0.043_159, 0.019_597, -0.007_540, 0.002_128];
+
+/// Planes of luminance and chroma, in the data window.
+pub(super) struct Planes {
+    /// Y, RY and BY.
+    channels: [Channel; 3],
+    /// Columns and rows.
+    size: Vec2<usize>,
+    /// Steps between samples of chroma.
+    step: Vec2<usize>,
+    luminance: Vec<f32>,
+    chroma: [Vec<f32>; 2],
+}
+
+impl Planes {
+    pub(super) fn new(headers: &[Header], channels: [Channel; 3]) -> Self {
+        let [_, ry, _] = channels;
+        let (size, step) = (headers[ry.part].layer_size, description(headers, ry).sampling);
+        let chroma = || vec![0.0; (size / step).area()];
+        Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
+    }
+
+    /// Bytes of luminance, and of chroma in every column of the rows that have some.
+    pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [Channel; 3]) -> u64 {
+        let size = headers[ry.part].layer_size;
+        let rows = size.height() / description(headers, ry).sampling.y();
+        let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
+        samples.saturating_mul(SAMPLE_BYTES as u64)
+    }
+
+    /// Adds a row of samples, if it is of one of the planes.
+    pub(super) fn add(&mut self, channel: Channel, row: usize, line: Line<'_>) {
+        let widths = [self.size, self.size / self.step, self.size / self.step].map(|size| size.width());
+        let [ry, by] = &mut self.chroma;
+        for ((plane, width), own) in [&mut self.luminance, ry, by].into_iter().zip(widths).zip(self.channels)
+        {
+            if let Some(row) = plane.chunks_exact_mut(width).nth(row).filter(|_| own == channel) {
+                line.values(0, row.iter_mut(), |place, value| *place = value);
+            }
+        }
+    }
+
+    /// Passes each pixel's column, row and color on. `weights` are those of red, green and blue in the luminance.
+    pub(super) fn colors(mut self, weights: DVec3, mut put: impl FnMut([usize; 2], [f32; 3])) {
+        let (width, height) = (self.size.width(), self.size.height());
+        let is_filtered = self.step == Vec2(2, 2);
+        self.widen();
+        if !is_filtered {
+            for (index, luminance) in self.luminance.iter().enumerate() {
+                let at = [index % width, index / width];
+                put(at, rgb(*luminance, self.interpolated(at), weights));
+            }
+            return;
+        }
+        let mut rows = [-1, 0, 1].map(|row| self.row(row, weights));
+        for y in 0..height {
+            for x in 0..width {
+                put([x, y], saturation_limited([&rows[0], &rows[1], &rows[2]], x, weights));
+            }
+            rows.rotate_left(1);
+            rows[2] = self.row(y as i64 + 2, weights);
+        }
+    }
+
+    /// Gives chroma a value in every column of the rows that have samples.
+    fn widen(&mut self) {
+        let (width, step) = (self.size.width(), self.step.x());
+        let widened = |plane: &Vec<f32>| -> Vec<f32> {
+            let rows = plane.chunks_exact(width / step);
+            rows.flat_map(|row| (0..width).map(|x| between(x, self.step, row.len(), |at| row[at]))).collect()
+        };
+        let chroma = [widened(&self.chroma[0]), widened(&self.chroma[1])];
+        self.chroma = chroma;
+    }
+
+    /// The colors of a row; the rows beyond the edges continue those within.
+    fn row(&self, y: i64, weights: DVec3) -> Vec<[f32; 3]> {
+        let (width, height) = (self.size.width(), self.size.height() as i64);
+        let inside = if y >= height { height - 2 } else { y.max(0) } as usize;
+        let color = |x: usize| {
+            let chroma = [0, 1].map(|plane| {
+                let sample = |row: i64| {
+                    let row = row.clamp(0, height / 2 - 1) as usize;
+                    self.chroma[plane][row * width + x]
+                };
+                if y % 2 == 0 { sample(inside as i64 / 2) } else { filtered((y - 1).div_euclid(2), sample) }
+            });
+            rgb(self.luminance[inside * width + x], chroma, weights)
+        };
+        (0..width).map(color).collect()
+    }
+
+    /// Chroma of a pixel, linear between rows that have samples.
+    fn interpolated(&self, [x, y]: [usize; 2]) -> [f32; 2] {
+        let (width, rows) = (self.size.width(), self.size.height() / self.step.y());
+        [0, 1].map(|plane| linear(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x]))
+    }
+}
+
+/// Chroma of a column: filtered where every second pixel of both directions has a sample, otherwise linear.
+fn between(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+    if step != Vec2(2, 2) {
+        return linear(x, step.x(), count, sample);
+    }
+    let last = count as i64 - 1;
+    match x % 2 {
+        0 => sample(x / 2),
+        _ => filtered(x as i64 / 2, |at| sample(at.clamp(0, last) as usize)),
+    }
+}
+
+/// The value between the samples `left` and `left + 1`.
+fn filtered(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
+    let pairs = (0..).zip(WEIGHTS);
+    pairs.map(|(away, weight)| weight * (sample(left - away) + sample(left + 1 + away))).sum()
+}
+
+/// The value of a pixel between samples `step` pixels apart; behind the last one, its value continues.
+fn linear(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+    let first = (pixel / step).min(count - 1);
+    let (low, part) = (sample(first), (pixel % step) as f32 / step as f32);
+    if part == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * part }
+}
+
+/// Red, green and blue of luminance and chroma; gray keeps its bits.
+fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
+    if ry == 0.0 && by == 0.0 {
+        return [luminance; 3];
+    }
+    let y = f64::from(luminance);
+    let (red, blue) = ((f64::from(ry) + 1.0) * y, (f64::from(by) + 1.0) * y);
+    let green = (y - red * weights.x - blue * weights.z) / weights.y;
+    [red as f32, green as f32, blue as f32]
+}
+
+/// The color of a pixel, less saturated where its neighbors are, with the same luminance (`RgbaYca::fixSaturation`).
+fn saturation_limited([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DVec3) -> [f32; 3] {
+    let (left, right) = (x.saturating_sub(1), (x + 1).min(row.len() - 1));
+    let corners = [above[left], above[right], below[left], below[right]].map(saturation);
+    let mean = (0.25 * corners.iter().sum::<f32>()).min(1.0);
+    let (color, found) = (row[x], saturation(row[x]));
+    let most = (1.0 - (1.0 - mean) * 0.25).min(1.0);
+    if found <= mean || found <= most {
+        return color;
+    }
+    let greatest = color.into_iter().fold(f32::MIN, f32::max);
+    let reduced = color.map(|part| (greatest - (greatest - part) * (most / found)).max(0.0));
+    let luminance = |color: [f32; 3]| DVec3::from_array(color.map(f64::from)).dot(weights);
+    let (wanted, got) = (luminance(color), luminance(reduced));
+    if got > 0.0 { reduced.map(|part| (f64::from(part) * wanted / got) as f32) } else { reduced }
+}
+
+/// 1 − least/greatest, or 0 without a positive part.
+fn saturation(color: [f32; 3]) -> f32 {
+    let greatest = color.into_iter().fold(f32::MIN, f32::max);
+    let least = color.into_iter().fold(f32::MAX, f32::min);
+    if greatest > 0.0 { 1.0 - least / greatest } else { 0.0 }
+}
