@@ -3,6 +3,7 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 
+use glimt::scene::SCENE_NOT_FOUND;
 use serde_json::Value;
 
 use super::test_dir::TestDir;
@@ -322,7 +323,7 @@ fn bench_reports_wrong_calls() {
     let (_, stderr) = bench(&dir, "wrong.toml", 2);
     assert!(stderr.contains("wrong.toml:13:"), "{stderr}");
     for (line, words) in [
-        ("none.toml", "there is no such scene file"),
+        ("none.toml", SCENE_NOT_FOUND),
         ("box.toml box.toml", "box.toml is given twice"),
         ("box.toml --samples 0", "expected a whole number from 1 to 4294967295"),
         ("box.toml --samples 1 --time 1", "cannot be used with"),

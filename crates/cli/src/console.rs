@@ -38,7 +38,7 @@ impl Console {
         Self { style, is_terminal: is_terminal && !is_dumb, lost: Rc::default() }
     }
 
-    /// Whether messages have colours.
+    /// Whether messages have colors.
     pub(super) fn is_colored(&self) -> bool {
         match self.style {
             Style::Ansi => true,

@@ -2,9 +2,9 @@
 
 /// Names that belong together, separated by commas, and their effect.
 pub const VARIABLES: [(&str, &str); 14] = [
-    ("NO_COLOR", "no colours, unless `--color` asks for them"),
-    ("CLICOLOR, CLICOLOR_FORCE, COLUMNS", "colours (0: none, 1: also without a terminal) and width of help"),
-    ("COLORTERM, TERM, TERM_PROGRAM", "which colours and blocks the terminal has"),
+    ("NO_COLOR", "no colors, unless `--color` asks for them"),
+    ("CLICOLOR, CLICOLOR_FORCE, COLUMNS", "colors (0: none, 1: also without a terminal) and width of help"),
+    ("COLORTERM, TERM, TERM_PROGRAM", "which colors and blocks the terminal has"),
     (
         "TERM_PROGRAM_VERSION, VTE_VERSION, KONSOLE_VERSION, XTERM_VERSION",
         "which version it has, and so whether it shows progress, links and notifications",

@@ -280,7 +280,7 @@ mod tests {
                     (ends.map(|end| end.to_string()).to_vec(), vec![*range.start() as i64 - 1])
                 }
                 KeyRange::Names(names) => (names.into_iter().map(str::to_owned).collect(), Vec::new()),
-                KeyRange::Color => panic!("--{name} is a colour"),
+                KeyRange::Color => panic!("--{name} is a color"),
             };
             let refused = refused.iter().map(i64::to_string).chain(["another".to_owned()]);
             for value in accepted {

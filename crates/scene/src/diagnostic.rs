@@ -1,4 +1,4 @@
-//! Errors and warnings as values: a message, the place in a file, what to do about it.
+//! Errors and warnings: a message, a source span and a help text.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -9,44 +9,44 @@ use std::sync::Arc;
 pub enum Severity {
     /// The scene cannot be rendered.
     Error,
-    /// It can, but this is probably not meant.
+    /// The scene can be rendered, but probably contains a mistake.
     Warning,
 }
 
-/// A mistake in a scene, or in a file that it names.
+/// An error or warning about a scene or a file that it references.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnostic {
     /// Error or warning.
     pub severity: Severity,
-    /// The mistake, in one line, starting with a small letter.
+    /// One line, starting in lower case.
     pub message: String,
-    /// The file with the mistake; empty for the call itself.
+    /// The file; empty for the command line.
     pub path: PathBuf,
-    /// The place in that file, if it has one.
-    pub place: Option<Place>,
-    /// Expected values, or the way out.
+    /// The span in that file, if known.
+    pub place: Option<SourceSpan>,
+    /// Expected values, or how to fix the problem.
     pub help: Option<String>,
 }
 
 impl Diagnostic {
-    /// An error in the file at `path`.
+    /// Creates an error in the file at `path`.
     pub(crate) fn error(
         path: &Path,
         message: String,
         help: Option<String>,
-        place: Option<Place>,
+        place: Option<SourceSpan>,
     ) -> Box<Self> {
         Box::new(Self { severity: Severity::Error, message, path: path.to_owned(), place, help })
     }
 }
 
-/// A place in a text.
+/// A labeled span of a text.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
+pub struct SourceSpan {
     /// The whole text.
     pub source: Arc<str>,
-    /// The bytes that are meant.
+    /// Byte range in [`Self::source`].
     pub span: Range<usize>,
-    /// A few words under the underline; may be empty.
+    /// Label of the underline; may be empty.
     pub label: String,
 }

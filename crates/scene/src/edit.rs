@@ -1,38 +1,36 @@
-//! The camera put back into the text of a scene: numbers take the place of numbers, all else stays as it is.
+//! Writes a camera into the text of a scene, keeping comments and formatting.
 
 use std::ops::Range;
 
 use super::description::{Pose, Viewpoint, is_same_distance};
 use super::document::{FOV_DEGREES, camera_of};
-use super::source::Source;
-use super::toml::{self, Entries, Item, KeyValue, Value};
+use super::source::SceneText;
+use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 use crate::math::DVec3;
 
-/// The text of a scene file with this camera in place of its own.
+/// Returns the text of a scene file with its camera replaced by `wanted`.
 ///
 /// # Errors
-/// Why that cannot be.
+/// The reason that the table `[camera]` cannot be edited.
 pub(super) fn with_camera(text: &str, wanted: &Viewpoint) -> Result<String, String> {
     let (document, errors) = toml::parse(text);
     let found = document.root().get("camera").filter(|_| errors.is_empty());
-    let Some(Item::Table(table)) = found.map(|found| found.value.item()) else {
-        return Err("the scene file has no table [camera] that can be read".to_owned());
+    let Some(TomlValue::Table(table)) = found.map(|found| found.value.item()) else {
+        return Err("the scene file has no readable [camera] table".to_owned());
     };
     let mut edits = Edits { text, table, replaced: Vec::new(), added: Vec::new() };
     edits.camera(wanted);
     let new = edits.applied();
-    let is_right = camera_of(&Source::file(new.as_str().into())).is_some_and(|new| new.is_nearly(wanted));
-    is_right
-        .then_some(new)
-        .ok_or_else(|| "the table [camera] is written in a way that glimt cannot change".to_owned())
+    let is_right = camera_of(&SceneText::file(new.as_str().into())).is_some_and(|new| new.is_nearly(wanted));
+    is_right.then_some(new).ok_or_else(|| "glimt cannot edit the [camera] table in this form".to_owned())
 }
 
-/// Edits of a table.
+/// Pending edits of a table.
 struct Edits<'t> {
     text: &'t str,
     table: Entries<'t>,
     replaced: Vec<(Range<usize>, String)>,
-    /// Keys that are not there yet, with their values.
+    /// New lines `key = value`.
     added: Vec<String>,
 }
 
@@ -55,7 +53,7 @@ impl Edits<'_> {
         self.number("fov", fov, FOV_DEGREES);
         self.number("aperture", aperture, 0.0);
         match self.table.get("focus") {
-            // The steps of a camera round its distance a little.
+            // Ignore rounding of the distance when the camera orbits.
             Some(given) if wanted.is_focused_on_look_at() && is_near(&given.value, focus) => {}
             Some(_) | None => self.number("focus", focus, wanted.pose.distance()),
         }
@@ -84,35 +82,37 @@ impl Edits<'_> {
         }
     }
 
-    /// A number that is the same already stays as it is written.
+    /// Replaces a number, unless it already has the value `wanted`.
     fn replace(&mut self, found: &Value<'_>, wanted: f64) {
         let is_same = match found.item() {
-            Item::Integer { digits, radix: 10 } | Item::Float(digits) => digits.parse() == Ok(wanted),
-            Item::Integer { .. }
-            | Item::String(_)
-            | Item::Boolean(_)
-            | Item::Datetime
-            | Item::Array(_)
-            | Item::Table(_) => false,
+            TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => {
+                digits.parse() == Ok(wanted)
+            }
+            TomlValue::Integer { .. }
+            | TomlValue::String(_)
+            | TomlValue::Boolean(_)
+            | TomlValue::Datetime
+            | TomlValue::Array(_)
+            | TomlValue::Table(_) => false,
         };
         if !is_same {
             self.replaced.push((found.span(), number(wanted)));
         }
     }
 
-    /// Text before a key in its line.
+    /// The text before a key on its line.
     fn indent(&self, key: &KeyValue<'_>) -> &str {
         let line = self.text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         &self.text[line..key.span.start]
     }
 
-    /// Whether a key has a line of its own, also `camera.key`.
+    /// Whether a key starts its line, possibly as `camera.key`.
     fn has_line(&self, key: &KeyValue<'_>) -> bool {
         let indent = self.indent(key).trim();
         indent.is_empty() || indent.ends_with('.')
     }
 
-    /// Text between a key with its value and the next key.
+    /// The separator between this entry and the next.
     fn between(&self, key: &KeyValue<'_>) -> String {
         if self.has_line(key) {
             format!("{}{}", self.line_end(key), self.indent(key))
@@ -121,7 +121,7 @@ impl Edits<'_> {
         }
     }
 
-    /// Line ending after this key; that of the line before, if this line is the last and has none.
+    /// The line ending after this entry, or of the previous line if this one is last and unterminated.
     fn line_end(&self, key: &KeyValue<'_>) -> &'static str {
         let (before, after) = self.text.split_at(key.value.span().end);
         let (line, _) = after.split_once('\n').or_else(|| before.rsplit_once('\n')).unwrap_or_default();
@@ -134,7 +134,7 @@ impl Edits<'_> {
         {
             let between = self.between(&last);
             let end = last.value.span().end;
-            // Behind the comment of the line.
+            // Insert after the line's comment.
             let line = self.text[end..].find('\n').map_or(self.text.len(), |at| end + at);
             let at = if self.has_line(&last) { self.text[..line].trim_end_matches('\r').len() } else { end };
             let added = self.added.iter().map(|one| format!("{between}{one}")).collect();
@@ -151,16 +151,16 @@ impl Edits<'_> {
     }
 }
 
-/// Whether a value is a distance that rounding may make of this one.
+/// Whether a value equals `distance` up to rounding.
 fn is_near(value: &Value<'_>, distance: f64) -> bool {
     let given: Option<f64> = match value.item() {
-        Item::Integer { digits, radix: 10 } | Item::Float(digits) => digits.parse().ok(),
-        Item::Integer { .. }
-        | Item::String(_)
-        | Item::Boolean(_)
-        | Item::Datetime
-        | Item::Array(_)
-        | Item::Table(_) => None,
+        TomlValue::Integer { digits, radix: 10 } | TomlValue::Float(digits) => digits.parse().ok(),
+        TomlValue::Integer { .. }
+        | TomlValue::String(_)
+        | TomlValue::Boolean(_)
+        | TomlValue::Datetime
+        | TomlValue::Array(_)
+        | TomlValue::Table(_) => None,
     };
     given.is_some_and(|given| is_same_distance(given, distance))
 }
@@ -169,7 +169,7 @@ fn array(vector: DVec3) -> String {
     format!("[{}]", vector.to_array().map(number).join(", "))
 }
 
-/// In digits alone; no zero has a sign.
+/// Formats a number as TOML: decimal digits without exponent, and 0 instead of -0.
 fn number(number: f64) -> String {
     (number + 0.0).to_string()
 }
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_numbers_change() {
+    fn only_numbers_change() {
         let text = "# a\n[camera] # eye\n\tposition = [ 0.0, 1, # up\n 4_0.0 ] # far\n\n  look_at=[0,1,0]\n[render]\nwidth=4\n";
         let expected = text.replace("0.0, 1,", "0.5, 1,").replace("4_0.0", "-3.25");
         assert_eq!(written(text, &view([0.5, 1.0, -3.25])), expected);
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_is_added_behind_the_last_key() {
+    fn missing_keys_are_added_after_the_last_one() {
         let wanted = Viewpoint { fov: 35.5, focus: 2.5, ..view([0.0, 1.0, 4.0]) };
         let camera = "position = [0, 1, 4]\nlook_at = [0, 1, 0]";
         for (text, expected) in [
@@ -224,9 +224,9 @@ mod tests {
     }
 
     #[test]
-    fn an_added_key_ends_its_line_as_its_neighbour_does() {
+    fn added_keys_keep_the_line_ending() {
         let wanted = Viewpoint { fov: 35.5, ..view([0.0, 1.0, 4.0]) };
-        // One line of the file ends otherwise than the camera's.
+        // The first line has a different ending from the camera's lines.
         for (first, end) in [("\r\n", "\n"), ("\n", "\r\n")] {
             let text = format!("# a{first}[camera]{end}position = [0, 1, 4]{end}look_at = [0, 1, 0]");
             assert_eq!(written(&text, &wanted), format!("{text}{end}fov = 35.5"), "at the end of the file");
@@ -237,13 +237,13 @@ mod tests {
     }
 
     #[test]
-    fn a_distance_that_rounding_changes_stays_as_it_is_written() {
+    fn rounding_leaves_the_focus_unchanged() {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\nfocus = 4\n";
         let orbited = view([2.8283, 1.0, 2.8285]);
         assert!(orbited.focus != 4.0 && (orbited.focus - 4.0).abs() < 1e-3);
         assert_eq!(written(text, &orbited), text.replace("[0, 1, 4]", "[2.8283, 1, 2.8285]"));
         let nearer = view([0.0, 1.0, 3.8]);
-        assert!(written(text, &nearer).contains("focus = 3.8"), "a step towards it is no rounding");
+        assert!(written(text, &nearer).contains("focus = 3.8"), "moving closer is more than rounding");
     }
 
     #[test]
@@ -261,14 +261,14 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_changed_is_refused() {
+    fn uneditable_cameras_are_rejected() {
         for text in ["", "[render]\nwidth = 4\n", "[camera]\nposition = [0, 1, 4\n", "camera = 3\n"] {
             assert!(with_camera(text, &view([0.0, 1.0, 4.0])).is_err(), "{text}");
         }
     }
 
-    /// Comments and empty lines, written for persons, with the number of lines with keys between them.
-    fn words(text: &str) -> Vec<String> {
+    /// Comments, with an empty string for each blank line.
+    fn comments(text: &str) -> Vec<String> {
         let comment = |line: &str| line.split_once('#').map(|(_, words)| words.to_owned());
         text.lines()
             .filter(|line| line.trim().is_empty() || line.contains('#'))
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn every_bundled_scene_keeps_its_words() {
+    fn every_bundled_scene_keeps_its_comments() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         let paths: Vec<_> =
             std::fs::read_dir(folder).expect("scenes").map(|entry| entry.expect("a file").path()).collect();
@@ -286,7 +286,7 @@ mod tests {
             let text = std::fs::read_to_string(path).expect("a scene");
             let wanted = Viewpoint { fov: 33.3, focus: 2.25, ..view([0.125, -2.0, 3.5]) };
             let new = written(&text, &wanted);
-            assert_eq!(words(&new), words(&text), "{}", path.display());
+            assert_eq!(comments(&new), comments(&text), "{}", path.display());
             let is_camera = |line: &str| {
                 let key = line.split('=').next().unwrap_or_default().trim();
                 ["position", "look_at", "up", "fov", "aperture", "focus", "orbiter"].contains(&key)
@@ -294,7 +294,7 @@ mod tests {
             let others = |text: &str| -> Vec<String> {
                 text.lines().filter(|line| !is_camera(line)).map(str::to_owned).collect()
             };
-            // Those of lights and others have such keys too: the camera's alone may differ.
+            // Lights and shapes have keys of the same names; only the camera's may differ.
             assert_eq!(others(&new), others(&text), "{}", path.display());
             let changed = text.lines().filter(|line| !new.lines().any(|other| other == *line)).count();
             assert!(changed <= 6, "{}: {changed} lines", path.display());

@@ -1,23 +1,24 @@
-//! Lights that shine away from everything.
+//! Detects quad lights that face away from the whole scene.
 
 use std::ops::Range;
 
 use super::description::{Camera, EmissionSides, Mesh, Object, Scene, Shape, greatest};
 use crate::math::DVec3;
 
-/// Warning about such a light, with its label and the way out.
+/// The warning, its label and its help text.
 pub(super) const MESSAGE: &str = "this light shines away from everything";
 pub(super) const LABEL: &str = "all shapes are behind it";
-pub(super) const HELP: &str = "swap `u` and `v`: its front is along u × v";
+pub(super) const HELP: &str = "swap `u` and `v`: the front faces along u × v";
 
-/// The least and the greatest coordinates of a mesh file; `None` if it has no vertices.
+/// The minimum and maximum corner of a mesh file's bounding box. `None` if it has no vertices.
 pub type MeshBounds = Option<[DVec3; 2]>;
 
-/// Least ratio of a reach in front of a light to the reach behind it that counts: a ceiling just above the light does not.
-const LEAST: f64 = 0.02;
+/// Smallest ratio of the scene's extent in front of a light to the extent behind it that counts as lit: a ceiling just
+/// above the light does not count.
+const MIN_FRONT_RATIO: f64 = 0.02;
 
-/// Quads that send light from their front alone where nothing is, while all that they could light is behind them. Asks for the bounds of the scene's
-/// mesh files only if there are such lights.
+/// Spans of one-sided quad lights with nothing in front of them and shapes behind them. Calls `bounds` only if the scene has
+/// one-sided quad lights.
 pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Range<usize>> {
     let emits = |object: &Object| {
         let material = object.material.map(|index| &scene.materials[index]);
@@ -45,13 +46,13 @@ pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> V
             others.clone().map(|(_, object)| of(object)).fold(0.0, f64::max)
         };
         let (ahead, behind) = (reach(front), reach(-front));
-        behind > 0.0 && ahead <= LEAST * behind && !sees(&scene.camera, corner, front)
+        behind > 0.0 && ahead <= MIN_FRONT_RATIO * behind && !sees(&scene.camera, corner, front)
     };
     let away = lights.into_iter().filter(|(number, (corner, front))| is_away(*number, *corner, *front));
     away.map(|(number, _)| scene.objects[number].span.clone()).collect()
 }
 
-/// Whether the camera is in front of a light; one in a file may be.
+/// Whether the camera is in front of a light. An orbiter camera counts, as its file is not read here.
 fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     match camera {
         Camera::LookAt { position, .. } => front.dot(*position - corner) > 0.0,
@@ -59,7 +60,7 @@ fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
     }
 }
 
-/// Reach of a shape in a direction of length 1, or a little more.
+/// Upper bound of the projections of a shape's points onto a unit direction.
 fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
     shape.reach(direction).unwrap_or_else(|| {
         let of = |mesh: &Mesh| Some(corners(mesh, bounds.get(mesh.file).copied().flatten()?));
@@ -67,7 +68,7 @@ fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
     })
 }
 
-/// The corners of a mesh's box where the scene has it.
+/// The transformed corners of a mesh's bounding box.
 fn corners(mesh: &Mesh, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
     let place = mesh.placed.transform();
     std::array::from_fn(|number| {

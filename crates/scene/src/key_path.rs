@@ -1,21 +1,21 @@
-//! Dotted keys in the form that `--set` takes: `materials."copper ball".roughness`.
+//! Dotted keys as `--set` takes them: `materials."copper ball".roughness`.
 
 use unicode_width::UnicodeWidthStr;
 
 use super::sanitize::{shortened, visible};
 use super::source::quoted;
 
-/// One part of a dotted key, in quotes if it is not a bare key.
+/// Formats one part of a dotted key, quoted if it is not a bare key.
 pub(super) fn part(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quoted(name) }
 }
 
-/// The parts of a dotted key, with their quotes. A dot inside quotes belongs to its part.
+/// Splits a dotted key into its parts, with their quotes. Dots inside quotes do not separate.
 pub fn key_parts(key: &str) -> Vec<&str> {
     let mut rest = key;
     let mut parts = Vec::new();
-    while let Some(end) = end_of(rest, '.') {
+    while let Some(end) = find_unquoted(rest, '.') {
         parts.push(&rest[..end]);
         rest = &rest[end + 1..];
     }
@@ -23,13 +23,12 @@ pub fn key_parts(key: &str) -> Vec<&str> {
     parts
 }
 
-/// Splits a text that starts with a dotted key at the first blank outside quotes.
+/// Splits a text that starts with a dotted key at the first space outside quotes.
 pub fn split_key(text: &str) -> Option<(&str, &str)> {
-    end_of(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
+    find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
-/// Shortens a dotted key to this many columns. Drops the tables at its left first; the last part, the property, is only cut if it
-/// does not fit by itself.
+/// Shortens a dotted key to `columns`. Drops leading tables first, and cuts the last part only if it alone is too long.
 pub fn shortened_key(key: &str, columns: usize) -> String {
     let key = visible(key);
     if key.width() <= columns {
@@ -37,7 +36,7 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     }
     let parts = key_parts(&key);
     let last = parts.len() - 1;
-    // A number means nothing without the list that it counts.
+    // Do not start with an index: it is meaningless without its list.
     let begins_with_number = |skipped: &usize| parts[*skipped].parse::<u64>().is_ok();
     let tails =
         (1..=last).filter(|skipped| !begins_with_number(skipped)).map(|skipped| parts[skipped..].join("."));
@@ -45,8 +44,8 @@ pub fn shortened_key(key: &str, columns: usize) -> String {
     fitting.unwrap_or_else(|| shortened(parts[last], columns))
 }
 
-/// Index of the first such character outside quotes.
-fn end_of(text: &str, end: char) -> Option<usize> {
+/// Byte index of the first `end` outside quotes.
+fn find_unquoted(text: &str, end: char) -> Option<usize> {
     let (mut is_quoted, mut is_escaped) = (false, false);
     for (at, c) in text.char_indices() {
         match c {
@@ -65,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quoted_parts_keep_their_dots_and_blanks() {
+    fn quoted_parts_keep_dots_and_spaces() {
         let key = r#"materials."copper \" ball v1.2".roughness"#;
         assert_eq!(key_parts(key), ["materials", r#""copper \" ball v1.2""#, "roughness"]);
         assert_eq!(key_parts("light.1.direction"), ["light", "1", "direction"]);
@@ -75,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn the_property_outlives_its_tables() {
+    fn leading_tables_are_dropped_first() {
         let key = r#"materials."copper ball".roughness"#;
         for (columns, shown) in [
             (40, key),

@@ -1,7 +1,7 @@
-//! The scene file: its syntax, its validation and what it means.
+//! The scene file format: TOML syntax, validation and the resulting scene description.
 //!
-//! [`load`] reads a file safely, [`parse`] turns its text into a [`description::Scene`] and a list of
-//! [`diagnostic::Diagnostic`]s; [`report`] makes text of those.
+//! [`load`] reads a file with size and type checks, [`parse`] turns its text into a [`description::Scene`] and a list of
+//! [`diagnostic::Diagnostic`]s, and [`report`] formats diagnostics for the terminal.
 
 mod changes;
 pub mod description;
@@ -36,81 +36,81 @@ pub use facing::MeshBounds;
 pub use key_path::{key_parts, shortened_key, split_key};
 pub use other_content::other_content;
 pub use read::same_text_beside;
-pub use source::{Source, quoted};
+pub use source::{SceneText, quoted};
 
-/// Scene files over this size, in bytes, are refused.
+/// Largest accepted scene file, in bytes.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
 
-/// The message where a scene file is not there.
-const NO_SUCH_FILE: &str = "there is no such scene file";
-/// Message about a file that is not there and is named like a model.
-const NO_SUCH_MODEL: &str = "there is no such file";
+/// Message for a missing scene file.
+pub const SCENE_NOT_FOUND: &str = "scene file not found";
+/// Message for a missing file with the extension of a model.
+pub const MODEL_NOT_FOUND: &str = "file not found";
 
-/// Words about another file in the help of an error about a missing scene.
+/// Phrase that names a renamed copy in the help of the error about a missing scene.
 pub const SAME_TEXT: &str = "has the same text";
 
-/// Whether a diagnostic says that a scene or model does not exist.
+/// Whether a diagnostic reports that the scene or model file does not exist.
 pub fn is_absence(diagnostic: &Diagnostic) -> bool {
-    [NO_SUCH_FILE, NO_SUCH_MODEL].contains(&diagnostic.message.as_str())
+    [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
-/// Scene files of more parts are refused, as each takes many times its bytes in memory: brackets, `=`, `,` and lines. A
-/// million spheres have half as many.
+/// Most syntax elements (brackets, `=`, `,` and lines) in a scene file: each takes many times its size in memory. A scene
+/// of a million spheres has half as many.
 const MAX_PARTS: usize = 32 << 20;
 
-/// A scene file that can be rendered.
+/// A valid scene, with its text and warnings.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// Its meaning.
+    /// The scene description.
     pub scene: Arc<Scene>,
-    /// Its text, and what the call sets, which every span in [`Self::scene`] points into.
-    pub source: Source,
-    /// The file, as named by the caller.
+    /// The file's text followed by the `--set` values. All spans in [`Self::scene`] index into it.
+    pub source: SceneText,
+    /// The path as given by the caller.
     pub path: PathBuf,
-    /// Likely mistakes, in the order of the file.
+    /// Likely mistakes, in file order.
     pub warnings: Vec<Diagnostic>,
-    /// Files that the scene file names, where the call sets anything: other ones may be read in their place.
+    /// Files referenced by the scene file itself; filled only with `--set`, which may replace them.
     pub named: Vec<PathBuf>,
-    /// Places of the settings' values.
+    /// Spans of the settings' values.
     pub settings: Vec<Setting>,
 }
 
-/// The place of a value in a table of settings.
+/// The span of a value in `[render]` or `[photons]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
     /// The name of the table: `render` or `photons`.
     pub table: &'static str,
     /// The key.
     pub key: String,
-    /// Bytes of the text, and of what the call sets.
+    /// Byte range in the text with the `--set` values.
     pub span: Range<usize>,
 }
 
-/// The text of a scene file as it is now.
+/// Reads the current text of a scene file.
 ///
 /// # Errors
-/// Why it cannot be read, with its name.
+/// The reason that the file cannot be read.
 pub fn text_now(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     read::text(path)
 }
 
 impl Loaded {
-    /// The text of the file with this camera in place of its own: numbers take the place of numbers, keys that are not there
-    /// are added, all else stays as it is.
+    /// Returns the file's text with `camera` written into `[camera]`. Replaces numbers in place and adds missing keys;
+    /// comments and formatting stay unchanged.
     ///
     /// # Errors
-    /// Why that cannot be.
+    /// The reason that the table cannot be edited.
     pub fn text_with_camera(&self, camera: &Viewpoint) -> Result<String, String> {
         edit::with_camera(self.source.text(), camera)
     }
 
-    /// The camera of a text with what the call sets, if both can be read.
+    /// The camera of a scene text with `--set` values applied. `None` if either has errors.
     pub fn camera_of(text: &str, sets: &[String]) -> Option<Camera> {
-        document::camera_of(&Source::with_sets(text.into(), sets).ok()?)
+        document::camera_of(&SceneText::with_sets(text.into(), sets).ok()?)
     }
 
-    /// A warning for each light that shines away from everything, as far as only the loaded meshes show it. Asks for their
-    /// bounds, one for each of [`Scene::mesh_files`], if there are such lights.
+    /// Warnings for lights that shine away from everything, in scenes with mesh files. Calls `bounds` only if there are
+    /// candidates; it returns one item per entry of [`Scene::mesh_files`].
     pub fn lights_facing_away(&self, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Diagnostic> {
         if self.scene.mesh_files.is_empty() {
             return Vec::new();
@@ -126,20 +126,20 @@ impl Loaded {
         facing::away(&self.scene, bounds).into_iter().map(warning).collect()
     }
 
-    /// The line of the file, from 1, in which something begins.
+    /// The line number in the file, from 1, where `span` starts.
     pub fn line(&self, span: &Range<usize>) -> usize {
         let before = self.source.text().get(..span.start).unwrap_or_default();
         before.bytes().filter(|byte| *byte == b'\n').count() + 1
     }
 
-    /// Place of a setting's value: in the file or in the values that the call sets. `None` if neither sets it.
+    /// The span of a setting's value, in the file or in a `--set` argument. `None` if neither sets it.
     pub fn setting(&self, table: &str, key: &str) -> Option<Range<usize>> {
         let is_it = |setting: &&Setting| setting.table == table && setting.key == key;
         self.settings.iter().find(is_it).map(|setting| setting.span.clone())
     }
 
-    /// A diagnostic at a place of this scene file, for what shows only later: a mesh without a usable face, a
-    /// texture that does not decode.
+    /// Creates a diagnostic at `span`, for problems found after parsing, such as a mesh without usable faces or a texture
+    /// that does not decode.
     pub fn diagnostic_at(
         &self,
         span: Range<usize>,
@@ -152,36 +152,36 @@ impl Loaded {
     }
 }
 
-/// Meaning of a text, as far as it could be understood.
+/// Result of parsing a scene text.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The scene; none if there is an error.
+    /// The scene. `None` if there is an error.
     pub scene: Option<Scene>,
-    /// Errors and warnings, in the order of the text.
+    /// Errors and warnings, in text order.
     pub diagnostics: Vec<Diagnostic>,
-    /// Places of the settings' values.
+    /// Spans of the settings' values.
     pub settings: Vec<Setting>,
 }
 
-/// Reads and validates a scene file, with values in place of its own: texts of the form `TABLE.KEY=VALUE`.
+/// Reads and validates a scene file. `sets` are overrides of the form `TABLE.KEY=VALUE`.
 ///
 /// # Errors
-/// Everything that is wrong with it, and its warnings, in the order of the file. Anything but a regular file
-/// of at most [`MAX_FILE_BYTES`] bytes of UTF-8 text is refused without blocking.
+/// All errors and warnings, in file order. Anything but a regular file of at most [`MAX_FILE_BYTES`] bytes of UTF-8 is
+/// rejected without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let text = read::text(path).map_err(|problem| vec![*problem])?;
-    load_source(Source::with_sets(text, sets)?, path, sets)
+    load_source(SceneText::with_sets(text, sets)?, path, sets)
 }
 
-/// Validates a text as the scene of a model, which is not read: its lines are in no file. Otherwise as [`load`].
+/// Like [`load`], for the generated scene of the model at `path`. Diagnostics have no line, as the text is in no file.
 ///
 /// # Errors
 /// As for [`load`].
-pub fn load_made(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
-    load_source(Source::with_sets(text, sets)?.made(), path, sets)
+pub fn load_generated(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+    load_source(SceneText::with_sets(text, sets)?.generated(), path, sets)
 }
 
-fn load_source(source: Source, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+fn load_source(source: SceneText, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let Outcome { scene, diagnostics, settings } = document::lower(&source, path);
     match scene {
         Some(scene) => {
@@ -193,26 +193,26 @@ fn load_source(source: Source, path: &Path, sets: &[String]) -> Result<Loaded, V
     }
 }
 
-/// Validates the text of a scene file. Of the files that it names only the metadata are looked at; they are
-/// searched for beside `path`, which names the scene in diagnostics and is not read.
+/// Validates the text of a scene file. `path` is not read: it is used in diagnostics, and relative paths are resolved
+/// against its folder. Of referenced files only the metadata is read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     if text.contains('\0') {
         return Outcome { scene: None, diagnostics: vec![*read::binary(path)], settings: Vec::new() };
     }
-    document::lower(&Source::file(text), path)
+    document::lower(&SceneText::file(text), path)
 }
 
-/// Whether a file shows a model of its own: it is a mesh by its name, and holds no scene all the same.
+/// Whether a file is a model: it has a mesh extension and does not contain a scene.
 pub fn is_model(path: &Path) -> bool {
     read::is_model(path)
 }
 
-/// Whether a file is a mesh by its name.
+/// Whether a file has a mesh extension.
 pub fn is_mesh(path: &Path) -> bool {
     document::is_mesh(path)
 }
 
-/// The commented scene that a new file starts with.
+/// The commented scene that `glimt new` writes.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")
 }

@@ -1,9 +1,9 @@
-//! The nearest of the names that exist.
+//! Suggestions for misspelled and foreign names.
 
 use strsim::osa_distance;
 
-/// The candidate that differs least from what was written, if it is near enough to be meant: at most one
-/// change in three characters, letter case and `-` for `_` not counted.
+/// The candidate with the smallest edit distance (optimal string alignment) to `written`, if at most one third of the
+/// characters differ. Ignores case and treats `-` as `_`.
 pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     if written.len() > LONGEST {
@@ -20,8 +20,8 @@ pub fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>)
         .map(|(_, candidate)| candidate)
 }
 
-/// Names that other programs have for what scenes of glimt call otherwise, each with what may be meant.
-const ELSEWHERE: [(&[&str], &[&str]); 17] = [
+/// Names used by other renderers, each with glimt's names for the same thing.
+const FOREIGN_NAMES: [(&[&str], &[&str]); 17] = [
     (
         &["color", "colour", "albedo", "base_color", "kd"],
         &["diffuse", "reflectance", "tint", "intensity", "irradiance"],
@@ -47,10 +47,10 @@ const ELSEWHERE: [(&[&str], &[&str]); 17] = [
     (&["sun", "distant", "infinite", "parallel"], &["directional"]),
 ];
 
-/// The candidate that is meant by a name that another program has for it, else the nearest.
+/// The candidate that `written` means in another renderer, or else the nearest one.
 pub fn meant<'a>(written: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let plain = written.to_lowercase().replace('-', "_");
-    let named = ELSEWHERE.iter().find(|(names, _)| names.contains(&plain.as_str()));
+    let named = FOREIGN_NAMES.iter().find(|(names, _)| names.contains(&plain.as_str()));
     let known = |name: &&str| candidates.iter().find(|candidate| *candidate == name).copied();
     let meant = named.and_then(|(_, meant)| meant.iter().find_map(known));
     meant.or_else(|| nearest(written, candidates.iter().copied()))
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_other_programs_are_known() {
+    fn names_of_other_renderers_are_known() {
         let phong = ["type", "diffuse", "specular", "shininess", "emission", "normal_strength"];
         assert_eq!(meant("color", &phong), Some("diffuse"));
         assert_eq!(meant("Roughness", &phong), Some("shininess"));
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn finds_slips_and_refuses_strangers() {
+    fn typos_match_but_unrelated_names_do_not() {
         let keys = ["center", "radius", "material", "u", "v"];
         assert_eq!(nearest("raduis", keys), Some("radius"));
         assert_eq!(nearest("centre", keys), Some("center"));

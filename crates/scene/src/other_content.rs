@@ -1,13 +1,14 @@
-//! Files in place of a scene that are something else, recognized by their first bytes: models, images, parts and checkpoints.
+//! Recognizes models, images, parts and checkpoints given in place of a scene, by their first bytes.
 
 use std::io::Read;
 use std::path::Path;
 
 use super::diagnostic::Diagnostic;
+use super::read::NEW_SCENE_HELP;
 use super::sanitize::visible;
 use crate::system::file::{self, PART_MARK};
 
-/// Whether a file may be a scene by its name.
+/// Whether a file has the extension of a scene.
 pub(super) fn may_be_scene(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
@@ -15,7 +16,7 @@ pub(super) fn may_be_scene(found: &Path) -> bool {
 /// Content other than a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum OtherContent {
-    /// A model, with its format and the usual ending of its files.
+    /// A model, with its format and usual extension.
     Model { format: &'static str, ending: &'static str },
     /// An image of this format.
     Image(&'static str),
@@ -23,8 +24,7 @@ pub(super) enum OtherContent {
     Part,
 }
 
-/// The error about a file that is an image, a part or a checkpoint, whatever its name. `None` for anything else, and for a file that
-/// cannot be read.
+/// Returns an error if a file is an image, a part or a checkpoint, whatever its name. `None` for other or unreadable files.
 pub fn other_content(path: &Path) -> Option<Box<Diagnostic>> {
     const START: u64 = 1 << 10;
     let (opened, _) = file::open(path).ok()?.ok()?;
@@ -37,7 +37,7 @@ pub fn other_content(path: &Path) -> Option<Box<Diagnostic>> {
 }
 
 impl OtherContent {
-    /// The content of bytes. `None` for what may be a scene.
+    /// Detects the content from the first bytes. `None` if it may be a scene.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(&PART_MARK) {
             return Some(Self::Part);
@@ -45,24 +45,25 @@ impl OtherContent {
         image_format(bytes).map(Self::Image).or_else(|| model(bytes))
     }
 
+    /// The error about this content in place of a scene.
     pub(super) fn problem(self, path: &Path) -> Box<Diagnostic> {
-        // The name without an ending that is for scenes.
+        // Drop the extension `.toml`.
         let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
         let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
         let (message, help) = match self {
             Self::Model { format, ending } => (
-                format!("this is a model ({format}), but its name does not end in .{ending}"),
-                format!("models are known by their endings: rename it to {}.{ending}", visible(&name)),
+                format!("this is a model ({format}), but its extension is not .{ending}"),
+                format!("glimt detects models by their extension: rename it to {}.{ending}", visible(&name)),
             ),
             Self::Image(format) => {
                 let has_settings = !matches!(format, "BMP" | "TGA" | "TIFF");
-                let info = if has_settings { "`glimt info` says how an image was made; " } else { "" };
-                let help = format!("{info}`glimt new FILE` writes a scene to start from");
+                let info = if has_settings { "`glimt info` shows how an image was rendered; " } else { "" };
+                let help = format!("{info}{NEW_SCENE_HELP}");
                 (format!("this is an image ({format}), not a scene"), help)
             }
             Self::Part => (
-                "this is a part of an image or a checkpoint, not a scene".to_owned(),
-                "`glimt info` says which scene it belongs to; `glimt merge` joins parts".to_owned(),
+                "this is a part or checkpoint of an image, not a scene".to_owned(),
+                "`glimt info` shows which scene it belongs to; `glimt merge` merges parts".to_owned(),
             ),
         };
         Diagnostic::error(path, message, Some(help), None)
@@ -86,22 +87,23 @@ fn image_format(bytes: &[u8]) -> Option<&'static str> {
     match bytes {
         _ if known.is_some() => known,
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("WebP"),
-        // A line of TOML has more than a key.
+        // Not a PPM if `=` follows: `P6` is then a TOML key.
         [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !begins_with(rest, b'=') => {
             Some("PPM")
         }
-        // The reserved bytes are 0, which no text has.
+        // The reserved bytes are 0, which does not occur in text.
         [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some("BMP"),
         _ => is_tga(bytes).then_some("TGA"),
     }
 }
 
-/// Whether the first byte that is not blank is this one.
+/// Whether the first byte after white space is `byte`.
 fn begins_with(bytes: &[u8], byte: u8) -> bool {
     bytes.trim_ascii_start().first() == Some(&byte)
 }
 
-/// Whether bytes are a TGA header, which has no mark: its fields are in range, and one of them is a byte that no text has.
+/// Whether `bytes` start with a TGA header. TGA has no magic number, so all fields must be valid; one of them is a byte that
+/// does not occur in text.
 fn is_tga(bytes: &[u8]) -> bool {
     let &[_, map, kind, first0, first1, count0, count1, depth, _, _, _, _, w0, w1, h0, h1, bits, ..] = bytes
     else {
@@ -114,7 +116,7 @@ fn is_tga(bytes: &[u8]) -> bool {
     is_kind && [w0, w1] != [0; 2] && [h0, h1] != [0; 2] && matches!(bits, 8 | 15 | 16 | 24 | 32)
 }
 
-/// A model, by the first line that is not a comment.
+/// Detects a model by its first line that is not a comment.
 fn model(bytes: &[u8]) -> Option<OtherContent> {
     if bytes.starts_with(b"glTF") {
         return Some(OtherContent::Model { format: "glTF", ending: "glb" });
@@ -142,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_are_known_by_their_start() {
+    fn images_are_recognized_by_magic_bytes() {
         let mut tga = vec![0; 18];
         (tga[2], tga[12], tga[14], tga[16]) = (2, 4, 4, 24);
         let images: [(&[u8], &str); 13] = [
@@ -171,24 +173,24 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_known_by_their_mark_and_large_images_are_not_large_scenes() {
+    fn parts_and_large_images_are_recognized() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
         std::fs::write(&path, PART_MARK).expect("written");
-        let part = super::super::text_now(&path).expect_err("refused");
-        assert!(part.message.contains("a part of an image or a checkpoint"), "{}", part.message);
+        let part = super::super::text_now(&path).expect_err("an error");
+        assert_eq!(part, OtherContent::Part.problem(&path));
         assert_eq!(other_content(&path), Some(part));
         std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
         let file = std::fs::File::options().write(true).open(&path).expect("opened");
         file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");
-        let large = super::super::text_now(&path).expect_err("refused");
-        assert_eq!(large.message, "this is an image (EXR), not a scene");
+        let large = super::super::text_now(&path).expect_err("an error");
+        assert_eq!(large, OtherContent::Image("EXR").problem(&path));
         std::fs::write(&path, b"v 0 0 0\n").expect("written");
-        assert_eq!(other_content(&path), None, "models are shown");
+        assert_eq!(other_content(&path), None, "models are rendered");
     }
 
     #[test]
-    fn models_without_their_endings_are_known_by_their_start() {
+    fn models_are_recognized_by_content() {
         let of = |text: &str| OtherContent::of(text.as_bytes());
         let ending = |text: &str| match of(text) {
             Some(OtherContent::Model { ending, .. }) => ending,
@@ -218,8 +220,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("model");
         std::fs::write(&path, "v 0 0 0\n").expect("written");
-        let Diagnostic { message, help, .. } = *super::super::text_now(&path).expect_err("refused");
-        assert_eq!(message, "this is a model (OBJ), but its name does not end in .obj");
-        assert!(help.expect("a way out").contains("rename it to model.obj"));
+        let error = super::super::text_now(&path).expect_err("an error");
+        assert_eq!(error, OtherContent::Model { format: "OBJ", ending: "obj" }.problem(&path));
+        assert!(error.help.expect("a help text").contains("model.obj"));
     }
 }

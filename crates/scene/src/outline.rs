@@ -1,36 +1,36 @@
-//! The tables of a text as they stand there, with the places of keys, values and names, whatever else is wrong with the text: for
-//! completions and editors.
+//! Tables of a scene text with the spans of their keys, values and names, for completions and editors. Works on texts with
+//! errors.
 
 use std::ops::Range;
 
 use super::key_path;
 use super::keys::key::{Form, KeyInfo, TableInfo, TypeInfo};
 use super::keys::tables;
-use super::toml::{self, Entries, Item, KeyValue, Value};
+use super::toml::{self, Entries, KeyValue, TomlValue, Value};
 
-/// A table of the text that the definition knows.
+/// A table of the text with a known definition.
 #[derive(Clone, Debug)]
 pub struct OutlineTable {
     /// Its definition.
     pub info: &'static TableInfo,
-    /// Its type, if the definition has types: that of its `type`, or the default. `None` for a type that is not known.
+    /// The type given by its key `type`, or the default. `None` if the definition has no types or the type is unknown.
     pub kind: Option<&'static TypeInfo>,
     /// `NAME` of `[materials.NAME]`, or the `name` of a shape.
-    pub name: Option<Spelled>,
-    /// Number among the tables of a list, from 1; else 1.
+    pub name: Option<SpannedName>,
+    /// Position in a list of tables, from 1. Otherwise 1.
     pub number: usize,
-    /// Its header, or its braces.
+    /// Byte range of its header or braces.
     pub span: Range<usize>,
     /// Its keys.
     pub keys: Vec<OutlineKey>,
 }
 
-/// A name and its place.
+/// A name and its span.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Spelled {
+pub struct SpannedName {
     /// The name.
     pub text: String,
-    /// Bytes of the text.
+    /// Byte range in the text.
     pub span: Range<usize>,
 }
 
@@ -38,16 +38,16 @@ pub struct Spelled {
 #[derive(Clone, Debug)]
 pub struct OutlineKey {
     /// The key.
-    pub name: Spelled,
-    /// Bytes of the value.
+    pub name: SpannedName,
+    /// Byte range of the value.
     pub value: Range<usize>,
     /// The value, if it is a string.
     pub text: Option<String>,
-    /// The keys in the braces of the value.
+    /// The keys of an inline table.
     pub inner: Vec<OutlineKey>,
 }
 
-/// The tables of a text, in the order of the definition.
+/// The tables of a text, in the order of their definitions.
 pub fn outline(text: &str) -> Vec<OutlineTable> {
     let (document, _) = toml::parse(text);
     let of = |info: &'static TableInfo| {
@@ -57,7 +57,7 @@ pub fn outline(text: &str) -> Vec<OutlineTable> {
     tables().iter().flat_map(of).collect()
 }
 
-/// The tables of one definition.
+/// The tables with the definition `info`.
 fn in_table(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
     match info.form {
         Form::Single => {
@@ -67,7 +67,7 @@ fn in_table(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable>
             let named = entries(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
             named
                 .filter_map(|one| {
-                    let name = Spelled { text: one.key.to_owned(), span: one.span };
+                    let name = SpannedName { text: one.key.to_owned(), span: one.span };
                     Some(table(info, Some(name), 1, one.value, &entries(one.value)?))
                 })
                 .collect()
@@ -88,7 +88,7 @@ fn in_table(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable>
 
 fn table(
     info: &'static TableInfo,
-    name: Option<Spelled>,
+    name: Option<SpannedName>,
     number: usize,
     value: Value<'_>,
     all: &Entries<'_>,
@@ -104,7 +104,7 @@ fn table(
 
 fn keys(all: &Entries<'_>) -> Vec<OutlineKey> {
     let key = |one: KeyValue<'_>| OutlineKey {
-        name: Spelled { text: one.key.to_owned(), span: one.span },
+        name: SpannedName { text: one.key.to_owned(), span: one.span },
         value: one.value.span(),
         text: spelled(one.value).map(|text| text.text),
         inner: entries(one.value).map_or_else(Vec::new, |inner| keys(&inner)),
@@ -112,33 +112,33 @@ fn keys(all: &Entries<'_>) -> Vec<OutlineKey> {
     all.iter().map(key).collect()
 }
 
-/// The text of a value that is one.
-fn spelled(value: Value<'_>) -> Option<Spelled> {
+/// The value, if it is a string.
+fn spelled(value: Value<'_>) -> Option<SpannedName> {
     match value.item() {
-        Item::String(text) => Some(Spelled { text: text.to_owned(), span: value.span() }),
-        Item::Integer { .. }
-        | Item::Float(_)
-        | Item::Boolean(_)
-        | Item::Datetime
-        | Item::Array(_)
-        | Item::Table(_) => None,
+        TomlValue::String(text) => Some(SpannedName { text: text.to_owned(), span: value.span() }),
+        TomlValue::Integer { .. }
+        | TomlValue::Float(_)
+        | TomlValue::Boolean(_)
+        | TomlValue::Datetime
+        | TomlValue::Array(_)
+        | TomlValue::Table(_) => None,
     }
 }
 
 fn entries(value: Value<'_>) -> Option<Entries<'_>> {
     match value.item() {
-        Item::Table(entries) => Some(entries),
-        Item::String(_)
-        | Item::Integer { .. }
-        | Item::Float(_)
-        | Item::Boolean(_)
-        | Item::Datetime
-        | Item::Array(_) => None,
+        TomlValue::Table(entries) => Some(entries),
+        TomlValue::String(_)
+        | TomlValue::Integer { .. }
+        | TomlValue::Float(_)
+        | TomlValue::Boolean(_)
+        | TomlValue::Datetime
+        | TomlValue::Array(_) => None,
     }
 }
 
 impl OutlineTable {
-    /// The keys that the table may have: of its type, or if that is not known, of all types.
+    /// The allowed keys: those of the table's type, or of all types if it is unknown.
     pub fn known(&self) -> Vec<&'static KeyInfo> {
         match self.kind {
             None if !self.info.types.is_empty() => {
@@ -155,7 +155,7 @@ impl OutlineTable {
         }
     }
 
-    /// The beginnings of the paths that lead to its keys, as `--set` takes them.
+    /// Key prefixes for `--set` that address this table.
     pub fn paths(&self) -> Vec<String> {
         let table = self.info.name;
         let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::part(&name.text)));
@@ -175,7 +175,7 @@ mod tests {
                         [[sphere]]\nname = \"ball\"\n[[sphere]]\n[[light]]\ntype = \"sun\"\n[nonsense]\na = 1\n[broken";
 
     #[test]
-    fn tables_have_their_names_types_and_paths() {
+    fn tables_have_names_types_and_paths() {
         let found: Vec<(Vec<String>, &str)> = outline(TEXT)
             .iter()
             .map(|table| (table.paths(), table.kind.map_or("", |kind| kind.name)))
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_have_their_places_also_in_braces() {
+    fn inline_table_keys_have_spans() {
         let tables = outline(TEXT);
         let wall = tables.iter().find(|table| table.paths() == ["materials.\"back wall\""]).expect("a table");
         let [diffuse] = wall.keys.as_slice() else { panic!("{wall:?}") };
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_type_may_have_the_keys_of_every_type() {
+    fn unknown_types_allow_all_keys() {
         let tables = outline(TEXT);
         let known = |path: &str| {
             let table =

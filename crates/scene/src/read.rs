@@ -1,37 +1,48 @@
-//! Bytes of a scene file, read without ever blocking or filling the memory.
+//! Reads scene files without blocking and with bounded memory.
 
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::diagnostic::{Diagnostic, Place};
+use super::diagnostic::{Diagnostic, SourceSpan};
 use super::document::is_mesh;
 use super::keys::endings::MESHES;
 use super::nearest::nearest;
 use super::other_content::{OtherContent, may_be_scene, other_content};
 use super::sanitize::visible;
-use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE, NO_SUCH_MODEL};
+use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
 use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
-/// The text. The error is one diagnostic that names the file.
+/// Hint after errors about files that are not scenes.
+pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
+/// Message for binary files.
+const NOT_TEXT: &str = "this is a binary file, not a scene";
+/// Message for meshes given in place of a scene.
+const MESH_NOT_SCENE: &str = "this is a mesh, not a scene";
+/// Message for dangling symbolic links.
+const DANGLING_LINK: &str = "this is a symbolic link to a file that does not exist";
+/// Message and hint for files that Git LFS has not downloaded.
+const LFS_POINTER: &str = "this is a Git LFS pointer, not the file's content";
+const LFS_HELP: &str = "run `git lfs pull`";
+
+/// Reads the text of a scene file.
 pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     if is_model(path) {
         return Err(mesh(path));
     }
-    if is_other_model(path) {
+    if is_unsupported_model(path) {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let message = format!("this is a model of a format that glimt does not read: .{ending}");
-        let help = format!("export it as one of these: .{}", MESHES.join(", ."));
+        let message = format!("glimt cannot read .{ending} models");
+        let help = format!("export it in one of these formats: .{}", MESHES.join(", ."));
         return Err(Diagnostic::error(path, message, Some(help), None));
     }
     let bytes = bytes(path).map_err(|(message, help)| {
-        // A large image is not a large scene.
+        // Report a large image as an image, not as a large scene.
         other_content(path).unwrap_or_else(|| Diagnostic::error(path, message, help, None))
     })?;
     if file::is_lfs_pointer(&bytes) {
-        let message = "this is a Git LFS pointer, not the file's content".to_owned();
-        return Err(Diagnostic::error(path, message, Some("run `git lfs pull`".to_owned()), None));
+        return Err(Diagnostic::error(path, LFS_POINTER.to_owned(), Some(LFS_HELP.to_owned()), None));
     }
     if let Some(content) = OtherContent::of(&bytes) {
         return Err(content.problem(path));
@@ -45,44 +56,49 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     }
 }
 
-/// A file that is no text.
+/// The error about a binary file.
 pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
     Diagnostic::error(
         path,
-        "this is a binary file, not the text of a scene".to_owned(),
-        Some("a scene is TOML, saved as UTF-8; `glimt new FILE` writes one to start from".to_owned()),
+        NOT_TEXT.to_owned(),
+        Some(format!("a scene is a TOML file in UTF-8; {NEW_SCENE_HELP}")),
         None,
     )
 }
 
-/// A mesh in place of a scene, and how to show it.
+/// The error about a mesh given in place of a scene.
 fn mesh(path: &Path) -> Box<Diagnostic> {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let help = format!(
-        "a scene shows it, by a table [[mesh]] with `file = \"{}\"`; `glimt new FILE` writes a scene to start from",
-        visible(&name)
+        "to use it in a scene, add [[mesh]] with {}; {NEW_SCENE_HELP}",
+        mesh_file_key(&visible(&name))
     );
-    Diagnostic::error(path, "this is a mesh, not a scene".to_owned(), Some(help), None)
+    Diagnostic::error(path, MESH_NOT_SCENE.to_owned(), Some(help), None)
 }
 
-/// Whether a file is named like a mesh and is no scene all the same, as its start shows. What cannot be read is none.
+/// The key `file` of `[[mesh]]`, as shown in help texts.
+fn mesh_file_key(name: &str) -> String {
+    format!("`file = \"{name}\"`")
+}
+
+/// Whether a readable file has a mesh extension and does not contain a scene.
 pub(super) fn is_model(path: &Path) -> bool {
     is_mesh(path) && lacks_camera(path)
 }
 
-/// Endings of models that glimt does not read.
-const OTHER_MODELS: [&str; 22] = [
+/// Extensions of unsupported model formats.
+const UNSUPPORTED_MODELS: [&str; 22] = [
     "3dm", "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb",
     "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
 ];
 
-/// Whether a file is named like a model of another format and does not hold a scene all the same.
-fn is_other_model(path: &Path) -> bool {
+/// Whether a readable file has the extension of an unsupported model and does not contain a scene.
+fn is_unsupported_model(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    OTHER_MODELS.contains(&ending.as_str()) && lacks_camera(path)
+    UNSUPPORTED_MODELS.contains(&ending.as_str()) && lacks_camera(path)
 }
 
-/// Whether the start of a file lacks the camera of a scene. False for what cannot be read.
+/// Whether the start of a file has no `[camera]` header. False for unreadable files.
 fn lacks_camera(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
@@ -99,9 +115,9 @@ fn not_utf8(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
     let line = bytes[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
     let message = format!("line {line} is not UTF-8 text: byte 0x{:02x} at offset {offset}", bytes[offset]);
     let span = offset..offset + char::REPLACEMENT_CHARACTER.len_utf8();
-    let label = "not a character in UTF-8".to_owned();
+    let label = "not a UTF-8 character".to_owned();
     let help = Some("save the file as UTF-8".to_owned());
-    Diagnostic::error(path, message, help, Some(Place { source, span, label }))
+    Diagnostic::error(path, message, help, Some(SourceSpan { source, span, label }))
 }
 
 type Refusal = (String, Option<String>);
@@ -118,12 +134,15 @@ fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
         return Err(too_large());
     }
     if parts(&bytes) > MAX_PARTS {
-        return Err(large(format!("the scene file has more than {} million parts", MAX_PARTS >> 20)));
+        return Err(large(format!(
+            "the scene file has more than {} million syntax elements",
+            MAX_PARTS >> 20
+        )));
     }
     Ok(bytes)
 }
 
-/// Number of the parts with which the memory of a text grows.
+/// Number of syntax elements, which determine the memory of the parsed document.
 fn parts(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
@@ -133,9 +152,9 @@ fn not_regular(path: &Path, kind: FileKind) -> Refusal {
         return (format!("this is {}, not a model", kind.words()), None);
     }
     let help = match kind {
-        FileKind::Folder => "name a scene file, such as scene.toml",
+        FileKind::Folder => "pass a scene file, such as scene.toml",
         FileKind::Regular | FileKind::Special | FileKind::Kernel => {
-            "a scene is read from a regular file, so that it can be watched"
+            "glimt reads scenes only from regular files, so that it can watch them"
         }
     };
     (format!("this is {}, not a scene file", kind.words()), Some(help.to_owned()))
@@ -146,41 +165,41 @@ fn too_large() -> Refusal {
 }
 
 fn large(message: String) -> Refusal {
-    (message, Some("large geometry belongs in mesh files, which [[mesh]] names".to_owned()))
+    (message, Some("put large geometry in mesh files and reference them with [[mesh]]".to_owned()))
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> Refusal {
     if error.kind() == io::ErrorKind::NotFound && is_link(path) {
-        return ("this is a symbolic link to a file that does not exist".to_owned(), None);
+        return (DANGLING_LINK.to_owned(), None);
     }
     if error.kind() == io::ErrorKind::NotFound {
         let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
         let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let is_model = is_mesh(path);
-        let near = neighbour(path, if is_model { is_mesh } else { may_be_scene });
+        let near = neighbor(path, if is_model { is_mesh } else { may_be_scene });
         let help = match (missing, near) {
             (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
             (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
-            // A model is not what glimt writes.
+            // `glimt new` writes no models.
             (None, None) if is_model => None,
-            (None, None) => Some("`glimt new FILE` writes a scene to start from".to_owned()),
+            (None, None) => Some(NEW_SCENE_HELP.to_owned()),
         };
-        let message = if is_model { NO_SUCH_MODEL } else { NO_SUCH_FILE };
+        let message = if is_model { MODEL_NOT_FOUND } else { SCENE_NOT_FOUND };
         return (message.to_owned(), help);
     }
     (format!("cannot read the scene file: {}", describe_error(error)), None)
 }
 
-/// Files of a folder that are looked at.
-pub(super) const MOST_FILES: usize = 2_000;
+/// Most files of a folder that are examined.
+pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 
-/// The file beside a missing one with the nearest name, among those that may be meant.
-pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
+/// The file with the most similar name in the folder of a missing file, among those that `may_be_meant` accepts.
+pub(super) fn neighbor(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
     let folder = path.parent()?;
     let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let names: Vec<String> = std::fs::read_dir(listed)
         .ok()?
-        .take(MOST_FILES)
+        .take(MAX_FOLDER_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| is_alike(Path::new(name), path) && may_be_meant(Path::new(name)))
         .filter(|name| matches!(file::kind(&folder.join(name)), Ok((FileKind::Regular, _))))
@@ -189,7 +208,7 @@ pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Op
     Some(folder.join(near))
 }
 
-/// Another file in the folder of a missing scene file that has this text: the scene was renamed.
+/// Another file with the same text in the folder of a missing scene file, which was probably renamed.
 pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
     let folder = path.parent()?;
     let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -198,21 +217,22 @@ pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
         matches!(file::kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
             && bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
     };
-    let names =
-        std::fs::read_dir(listed).ok()?.take(MOST_FILES).filter_map(|entry| Some(entry.ok()?.file_name()));
+    let names = std::fs::read_dir(listed)
+        .ok()?
+        .take(MAX_FOLDER_FILES)
+        .filter_map(|entry| Some(entry.ok()?.file_name()));
     let named = |name| folder.join::<std::ffi::OsString>(name);
-    // The order of a folder is that of its system.
+    // Folder order depends on the file system, so take the first by name.
     names.map(named).filter(|file| file != path && has_text(file)).min()
 }
 
-/// Whether a file may be meant by another name: of the same kind, or of the same name but for the kind. A link to
-/// nowhere is not meant by its own name.
+/// Whether two different file names share their extension or their stem.
 fn is_alike(found: &Path, meant: &Path) -> bool {
     found.file_name() != meant.file_name()
         && (found.extension() == meant.extension() || found.file_stem() == meant.file_stem())
 }
 
-/// Whether a name of a missing file is a link.
+/// Whether a path is a symbolic link, even a dangling one.
 pub(super) fn is_link(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_ok_and(|metadata| metadata.is_symlink())
 }
@@ -227,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_renamed_scene_is_found_by_its_text() {
+    fn renamed_scenes_are_found_by_text() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = |name: &str| folder.path().join(name);
         let write = |name: &str, text: &str| std::fs::write(file(name), text).expect("written");
@@ -244,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_file_is_refused_at_once() {
+    fn special_files_are_rejected_without_blocking() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(message(folder.path()).message.contains("folder"));
         assert!(message(Path::new("/dev/zero")).message.contains("device"));
@@ -259,43 +279,41 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_file_offers_its_neighbour() {
+    fn missing_files_suggest_similar_names() {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("cornell.toml"), "").expect("written");
         let missing = message(&folder.path().join("cornel.toml"));
-        assert!(missing.message.contains("no such scene file"));
-        assert!(missing.help.expect("a way out").contains("cornell.toml"));
+        assert_eq!(missing.message, SCENE_NOT_FOUND);
+        assert!(missing.help.expect("a help text").contains("cornell.toml"));
         let other_kind = message(&folder.path().join("cornels.tom"));
-        assert!(other_kind.help.expect("a way out").contains("glimt new"));
+        assert!(other_kind.help.expect("a help text").contains("glimt new"));
         let dangling = folder.path().join("link.toml");
         std::os::unix::fs::symlink(folder.path().join("gone"), &dangling).expect("a link");
-        assert!(message(&dangling).message.contains("symbolic link to a file that does not exist"));
-        // Nor is a folder, a link that leads nowhere or a pipe.
+        assert_eq!(message(&dangling).message, DANGLING_LINK);
+        // Folders, dangling links and pipes are not suggested.
         std::fs::create_dir(folder.path().join("hall.toml")).expect("made");
         std::os::unix::fs::symlink(folder.path().join("gone"), folder.path().join("halls.toml"))
             .expect("a link");
         let not_regular = message(&folder.path().join("hal.toml"));
-        assert!(not_regular.help.expect("a way out").contains("glimt new"));
-        // An image does not count as a scene.
+        assert!(not_regular.help.expect("a help text").contains("glimt new"));
+        // Images are not suggested.
         std::fs::write(folder.path().join("my_hall.png"), "").expect("written");
         let picture = message(&folder.path().join("my_hall.toml"));
-        assert!(picture.help.expect("a way out").contains("glimt new"));
-        // A model is none that glimt writes.
+        assert!(picture.help.expect("a help text").contains("glimt new"));
+        // `glimt new` does not write models.
         std::fs::write(folder.path().join("knot.obj"), "").expect("written");
         for (name, help) in [("know.obj", Some("knot.obj")), ("nothing.glb", None), ("cornell.ply", None)] {
             let model = message(&folder.path().join(name));
-            assert_eq!(model.message, "there is no such file");
+            assert_eq!(model.message, MODEL_NOT_FOUND);
             assert_eq!(model.help.is_some(), help.is_some(), "{name}: {:?}", model.help);
-            assert!(
-                model.help.is_none_or(|words| words.contains("did you mean") && words.contains("knot.obj"))
-            );
+            assert!(model.help.is_none_or(|help| help.contains("did you mean") && help.contains("knot.obj")));
         }
         let lonely = message(&folder.path().join("zebra"));
-        assert!(lonely.help.expect("a way out").contains("glimt new"));
+        assert!(lonely.help.expect("a help text").contains("glimt new"));
     }
 
     #[test]
-    fn a_mesh_is_no_scene() {
+    fn meshes_are_not_scenes() {
         let folder = tempfile::tempdir().expect("a folder");
         let contents: [(&str, &[u8]); 3] =
             [("a.obj", b"v 0 0 0\n"), ("b.PLY", b"ply\n"), ("c.glb", b"glTF\0\0")];
@@ -303,8 +321,8 @@ mod tests {
             let path = folder.path().join(name);
             std::fs::write(&path, content).expect("written");
             let Diagnostic { message, help, .. } = message(&path);
-            assert_eq!(message, "this is a mesh, not a scene");
-            assert!(help.expect("a way out").contains(&format!("[[mesh]] with `file = \"{name}\"`")));
+            assert_eq!(message, MESH_NOT_SCENE);
+            assert!(help.expect("a help text").contains(&mesh_file_key(name)));
         }
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");
@@ -312,25 +330,24 @@ mod tests {
     }
 
     #[test]
-    fn a_pointer_of_git_lfs_is_named() {
+    fn git_lfs_pointers_are_recognized() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 9\n")
             .expect("written");
-        let said = message(&path);
-        assert_eq!(said.message, "this is a Git LFS pointer, not the file's content");
-        assert_eq!(said.help.as_deref(), Some("run `git lfs pull`"));
+        let Diagnostic { message, help, .. } = message(&path);
+        assert_eq!((message.as_str(), help.as_deref()), (LFS_POINTER, Some(LFS_HELP)));
     }
 
     #[test]
-    fn size_and_encoding() {
+    fn size_and_encoding_are_checked() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("scene.toml");
         let file = File::create(&path).expect("a file");
         file.set_len(MAX_FILE_BYTES + 1).expect("grown");
         assert!(message(&path).message.contains("128 MiB"));
         std::fs::write(&path, "x=[[],[]]\n".repeat(MAX_PARTS / 7)).expect("written");
-        assert!(message(&path).message.contains("32 million parts"));
+        assert!(message(&path).message.contains("32 million"));
         std::fs::write(&path, b"# fine\nname = \"\xe4\"\n").expect("written");
         let encoding = message(&path);
         assert!(encoding.message.contains("line 2"), "{}", encoding.message);

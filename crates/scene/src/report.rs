@@ -1,7 +1,7 @@
-//! Diagnostics as text: `file:line:column`, the source line with the place underlined, the way out.
+//! Formats diagnostics as text: `file:line:column`, the source line with the span underlined, and the help.
 //!
-//! Everything that comes from files passes [`visible`], so that only the report's own line ends, and in
-//! [`Style::Ansi`] its own colours, reach the output.
+//! Text from files passes through [`visible`], so the only control characters in the output are the report's own line ends
+//! and, with [`Style::Ansi`], its own colors.
 
 mod lines;
 
@@ -15,19 +15,19 @@ use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet}
 use super::diagnostic::{Diagnostic, Severity};
 use super::sanitize::visible;
 
-pub use lines::{Line, Piece, Role, lines};
+pub use lines::{Piece, ReportLine, Role, lines};
 
-/// Whether a report has colours.
+/// Whether a report is colored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Text only.
+    /// Plain text.
     Plain,
     /// With ANSI escape sequences.
     Ansi,
 }
 
-/// The diagnostics, ordered by file and place, and a last line that counts them; empty if there are none.
-/// `width` is that of the terminal in columns: messages are wrapped at it, source lines cut.
+/// Formats diagnostics in order of file and position, with a summary line. Empty if there are none. Messages are wrapped at
+/// `width` columns, and source lines are cut.
 pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String {
     let renderer = match style {
         Style::Plain => Renderer::plain(),
@@ -36,7 +36,7 @@ pub fn render(diagnostics: &[Diagnostic], width: usize, style: Style) -> String 
     render_with(diagnostics, width, &renderer)
 }
 
-/// `2 errors, 1 warning`.
+/// Counts the diagnostics, as in `2 errors, 1 warning`.
 pub fn summary(diagnostics: &[Diagnostic]) -> String {
     let count = |severity| diagnostics.iter().filter(|one| one.severity == severity).count();
     let words = |count: usize, name: &str| match count {
@@ -48,12 +48,12 @@ pub fn summary(diagnostics: &[Diagnostic]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-/// Finds lines and columns of many places, most of them in one text.
+/// Converts offsets to lines and columns, caching the line index of the last text.
 #[derive(Default)]
 pub struct Locator(Option<(Arc<str>, LineIndex)>);
 
 impl Locator {
-    /// [`line_and_column`] of a text that was most likely the last one.
+    /// Like [`line_and_column`], but fast for repeated calls with the same text.
     pub fn locate(&mut self, source: &Arc<str>, offset: usize) -> (usize, usize) {
         let (source, lines) = self.lines(source);
         lines.locate(source, offset)
@@ -65,7 +65,7 @@ impl Locator {
     }
 }
 
-/// Line and column of a byte of a text, both from 1; columns count characters.
+/// Line and column of a byte offset, both from 1. Columns count characters.
 pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
     LineIndex::new(source).locate(source, offset)
 }
@@ -80,7 +80,7 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
     let mut index = Locator::default();
     let mut text = String::new();
     for diagnostic in sorted {
-        text.push_str(&one(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
+        text.push_str(&render_one(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
         text.push_str("\n\n");
     }
     text.push_str(&summary(diagnostics));
@@ -88,10 +88,10 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
     text
 }
 
-/// Narrower terminals get a report of this width.
+/// Least width of a report, for narrower terminals.
 const MIN_WIDTH: usize = 30;
 
-fn one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut Locator) -> String {
+fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut Locator) -> String {
     let level = match diagnostic.severity {
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
@@ -108,14 +108,14 @@ fn one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut L
         let excerpt = Excerpt::new(source, whole, &place.span);
         let label = visible(&place.label);
         let fits = excerpt.label_column(line) + columns(&label) <= width;
-        // The renderer wraps no labels, only notes.
+        // The renderer does not wrap labels, so show a long one as a note.
         note = (!fits && !label.is_empty()).then_some(place.label.as_str());
         let label = (fits && !label.is_empty()).then(|| label.into_owned());
         let annotation = AnnotationKind::Primary.span(excerpt.span).label(label);
         snippet = Some(Snippet::source(excerpt.text).line_start(line).annotation(annotation));
     }
     let title = level.primary_title(wrapped(&diagnostic.message, width.saturating_sub("warning: ".len())));
-    // What is wrong with the call has no file.
+    // Errors in the command line have no file.
     let has_origin = !path.is_empty();
     let mut group: Group<'_> = if has_origin { title.element(origin) } else { Group::with_title(title) };
     if let Some(snippet) = snippet {
@@ -131,7 +131,7 @@ fn one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut L
     if has_origin { rendered } else { without_lines(&rendered, "|") }
 }
 
-/// The text of a rendered line, without colours and the blanks around it.
+/// A rendered line without colors and surrounding white space.
 fn bare(line: &str) -> String {
     let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
         Some((_, text)) if number > 0 => text,
@@ -140,25 +140,25 @@ fn bare(line: &str) -> String {
     parts.collect::<String>().trim().to_owned()
 }
 
-/// The rendered text without lines of nothing but this.
+/// Removes rendered lines that consist only of `text`.
 fn without_lines(rendered: &str, text: &str) -> String {
     rendered.split_inclusive('\n').filter(|line| bare(line) != text).collect()
 }
 
-/// The renderer announces a snippet whose origin was already given by a line `:::` of its own.
+/// Removes the line `:::`, which the renderer adds before a snippet whose origin it has already shown.
 fn without_second_origin(rendered: &str) -> String {
     let Some(second) = rendered.lines().find(|line| bare(line) == ":::") else { return rendered.to_owned() };
     rendered.replacen(&format!("{second}\n"), "", 1)
 }
 
-/// One line of a source around a place, safe to show, and where the place is in it.
+/// A source line that is safe to display, with the underlined span.
 struct Excerpt {
     text: String,
     span: Range<usize>,
 }
 
 impl Excerpt {
-    /// Bytes of a very long line that are kept, near the place.
+    /// Bytes of a long line kept on each side of the span.
     const NEAR_BYTES: usize = 1_000;
 
     fn new(source: &str, line: Range<usize>, place: &Range<usize>) -> Self {
@@ -173,15 +173,14 @@ impl Excerpt {
         Self { span: from..from + inside.len(), text: format!("{before}{inside}{after}") }
     }
 
-    /// Columns before the label of the place: the number of the line, ` | `, the text and the carets under the place
-    /// with a blank behind them.
+    /// The column where the label starts: after the line number, ` | `, the text before the span, the carets and a space.
     fn label_column(&self, line: usize) -> usize {
         let frame = line.to_string().len() + " | ".len();
         frame + columns(&self.text[..self.span.start]) + columns(&self.text[self.span.clone()]).max(1) + 1
     }
 }
 
-/// Columns that a text takes in a terminal.
+/// Display width of a text.
 fn columns(text: &str) -> usize {
     unicode_width::UnicodeWidthStr::width(text)
 }
@@ -194,7 +193,7 @@ fn floor_char(source: &str, offset: usize) -> usize {
     offset
 }
 
-/// Beginnings of a text's lines.
+/// Byte offsets of the line starts of a text.
 pub(crate) struct LineIndex {
     starts: Vec<usize>,
 }
@@ -205,12 +204,12 @@ impl LineIndex {
         Self { starts: std::iter::once(0).chain(after).collect() }
     }
 
-    /// The line of a byte, from 1.
+    /// The line of a byte offset, from 1.
     pub(super) fn line(&self, offset: usize) -> usize {
         self.starts.partition_point(|start| *start <= offset)
     }
 
-    /// Line and column from 1. A byte order mark has no column.
+    /// Line and column, from 1. A byte order mark is not counted.
     pub(super) fn locate(&self, source: &str, offset: usize) -> (usize, usize) {
         let offset = floor_char(source, offset);
         let line = self.line(offset);
@@ -219,7 +218,7 @@ impl LineIndex {
         (line, before.chars().count() + 1)
     }
 
-    /// Bytes of a line (from 0) without its end and without a byte order mark.
+    /// Byte range of line `line` (from 0), without its line end and byte order mark.
     pub(super) fn span(&self, line: usize, source: &str) -> Option<Range<usize>> {
         let start = *self.starts.get(line)?;
         let end = self.starts.get(line + 1).map_or(source.len(), |next| next - 1);
@@ -229,7 +228,7 @@ impl LineIndex {
     }
 }
 
-/// Safe to show, broken between words where a line would be longer than `width` characters.
+/// Makes a text safe to display and wraps it between words at `width` characters.
 fn wrapped(text: &str, width: usize) -> Cow<'static, str> {
     let text = visible(text);
     let mut lines = String::with_capacity(text.len());

@@ -1,13 +1,12 @@
-//! Text from files, made safe to show: no control bytes, nothing invisible, nothing that turns the direction
-//! of writing.
+//! Makes text from files safe to display: no control characters, invisible characters or bidirectional overrides.
 
 use std::borrow::Cow;
 
 use crate::system::text::is_plain;
 
-/// The text with every character that a terminal would act on, or not show at all, replaced by a visible
-/// stand-in: `␛` for ESC and `␊` for a line end (control pictures), four spaces for a tab, `\u{202e}` for C1
-/// bytes, directional marks, zero-width characters and the like. The result is one line.
+/// Replaces control and invisible characters by visible ones: control pictures such as `␛` for ESC and `␊` for a line feed,
+/// four spaces for a tab, and escapes such as `\u{202e}` for C1 controls, directional marks and zero-width characters. The
+/// result is one line.
 pub fn visible(text: &str) -> Cow<'_, str> {
     if text.chars().all(is_plain) {
         return Cow::Borrowed(text);
@@ -25,8 +24,7 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// [`visible`] text, cut in the middle of nowhere: at most `limit` characters, the last one `…` where more
-/// followed.
+/// [`visible`] text truncated to `limit` characters, with a final `…` if something was cut.
 pub fn shortened(text: &str, limit: usize) -> String {
     let shown = visible(text);
     if shown.chars().count() <= limit {
@@ -45,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_terminal_acts_on_becomes_visible() {
+    fn control_characters_become_visible() {
         assert_eq!(visible("\u{1b}]52;c;x\u{7}"), "␛]52;c;x␇");
         assert_eq!(visible("a\r\nb\tc\u{7f}\0"), "a␍␊b    c␡␀");
         assert_eq!(visible("\u{9b}31m\u{202e}gpj.exe\u{2066}"), "\\u{9b}31m\\u{202e}gpj.exe\\u{2066}");
@@ -53,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn shortening_counts_what_is_shown() {
+    fn limit_counts_visible_characters() {
         assert_eq!(shortened("äöü", 3), "äöü");
         assert_eq!(shortened("äöüß", 3), "äö…");
         assert_eq!(shortened("a\tbc", 4), "a  …");

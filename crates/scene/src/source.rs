@@ -1,43 +1,44 @@
-//! The text of a scene: the file, and behind it what the call sets, so that every place is a range of one text.
+//! The text of a scene: the file followed by the `--set` values, so that every span indexes one text.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::diagnostic::{Diagnostic, Place, Severity};
+use super::diagnostic::{Diagnostic, Severity, SourceSpan};
 use super::toml::is_key_value;
 
-/// Name in place of a file in messages about values that the call sets.
-const CALL: &str = "--set";
+/// File name shown in diagnostics about `--set` values.
+const SET_OPTION: &str = "--set";
 
-/// A scene file and what the call sets.
+/// The text of a scene file and the `--set` values.
 #[derive(Clone, Debug)]
-pub struct Source {
+pub struct SceneText {
     all: Arc<str>,
-    /// Bytes of the file.
+    /// Length of the file's text in `all`.
     file: usize,
     sets: Vec<Set>,
-    /// Whether the text was made of a model: its lines are in no file.
-    is_made: bool,
+    /// Whether the text was generated for a model, so its lines are in no file.
+    is_generated: bool,
 }
 
-/// A value that the call sets: its part of the text, and the same as a text of its own.
+/// A `--set` value: its span in the whole text, and its own text for diagnostics.
 #[derive(Clone, Debug)]
 struct Set {
     span: Range<usize>,
     text: Arc<str>,
 }
 
-impl Source {
-    /// A file as it is.
+impl SceneText {
+    /// The text of a file, without `--set` values.
     pub fn file(text: Arc<str>) -> Self {
-        Self { file: text.len(), all: text, sets: Vec::new(), is_made: false }
+        Self { file: text.len(), all: text, sets: Vec::new(), is_generated: false }
     }
 
-    /// A file with texts of the form `TABLE.KEY=VALUE`. A value that is neither TOML nor a number is taken for a text.
+    /// The text of a file with `--set` values of the form `TABLE.KEY=VALUE`. A value that is neither TOML nor a number becomes
+    /// a string.
     ///
     /// # Errors
-    /// Each text that does not have that form.
+    /// One error for each malformed value.
     pub fn with_sets(file: Arc<str>, sets: &[String]) -> Result<Self, Vec<Diagnostic>> {
         if sets.is_empty() {
             return Ok(Self::file(file));
@@ -54,13 +55,13 @@ impl Source {
             }
         }
         if wrong.is_empty() {
-            Ok(Self { all: all.into(), file: file.len(), sets: known, is_made: false })
+            Ok(Self { all: all.into(), file: file.len(), sets: known, is_generated: false })
         } else {
             Err(wrong)
         }
     }
 
-    /// The file and what is set.
+    /// The text of the file and the `--set` values.
     pub(super) fn all(&self) -> &Arc<str> {
         &self.all
     }
@@ -70,42 +71,47 @@ impl Source {
         self.all.get(..self.file).unwrap_or_default()
     }
 
-    /// [`Self::text`], to be kept: shared, unless the call sets anything.
+    /// [`Self::text`] as an `Arc`. Copied only if there are `--set` values.
     pub fn shared_text(&self) -> Arc<str> {
         if self.sets.is_empty() { Arc::clone(&self.all) } else { self.text().into() }
     }
 
-    /// Beginnings of the values that the call sets.
+    /// Byte offsets of the `--set` values.
     pub(super) fn sets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)
     }
 
-    /// The same as the text of a model's scene.
-    pub(super) fn made(self) -> Self {
-        Self { is_made: true, ..self }
+    /// Marks the text as generated for a model.
+    pub(super) fn generated(self) -> Self {
+        Self { is_generated: true, ..self }
     }
 
-    /// A place of the file at `path`, or of what is set, and what holds it. `None` for a place of a text that is in no file.
-    pub(super) fn place(&self, path: &Path, span: Range<usize>, label: String) -> (PathBuf, Option<Place>) {
+    /// Resolves a span to the file at `path` or to a `--set` value. The span is `None` in a generated text.
+    pub(super) fn place(
+        &self,
+        path: &Path,
+        span: Range<usize>,
+        label: String,
+    ) -> (PathBuf, Option<SourceSpan>) {
         let set = self.sets.iter().find(|set| set.span.start <= span.start && span.end <= set.span.end);
         let (path, source, span) = match set {
             Some(Set { span: own, text }) => {
-                (Path::new(CALL), text, span.start - own.start..span.end - own.start)
+                (Path::new(SET_OPTION), text, span.start - own.start..span.end - own.start)
             }
-            None if self.is_made => return (path.to_owned(), None),
+            None if self.is_generated => return (path.to_owned(), None),
             None => (path, &self.all, span),
         };
         let is_inside = source.get(span.clone()).is_some();
         let span = if is_inside { span } else { 0..0 };
-        (path.to_owned(), Some(Place { source: Arc::clone(source), span, label }))
+        (path.to_owned(), Some(SourceSpan { source: Arc::clone(source), span, label }))
     }
 }
 
-/// The text as TOML: with its value as it stands, or as a text in quotes. None: it has no key in a table, or no `=`.
+/// Converts `TABLE.KEY=VALUE` to TOML, quoting the value if necessary. `None` without `=` or a key in a table.
 fn key_value(set: &str) -> Option<String> {
-    // Keys in quotes may have some.
-    const MOST_EQUALS_SIGNS: usize = 8;
-    set.match_indices('=').take(MOST_EQUALS_SIGNS).find_map(|(at, _)| {
+    // Quoted keys may contain `=`, so try each one.
+    const MAX_EQUALS_SIGNS: usize = 8;
+    set.match_indices('=').take(MAX_EQUALS_SIGNS).find_map(|(at, _)| {
         let (key, value) = (set[..at].trim(), set[at + 1..].trim());
         let with = |value: &str| Some(format!("{key} = {value}")).filter(|text| is_key_value(text));
         with("0")?;
@@ -113,13 +119,13 @@ fn key_value(set: &str) -> Option<String> {
     })
 }
 
-/// A number without digits before or after its point, as TOML writes it.
+/// Completes numbers such as `.5` and `5.`, which TOML does not accept.
 fn number(text: &str) -> Option<String> {
     let number: f64 = text.parse().ok().filter(|number: &f64| number.is_finite())?;
     text.contains('.').then(|| format!("{number:?}"))
 }
 
-/// A basic string of TOML.
+/// Formats a TOML basic string.
 pub fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for character in text.chars() {
@@ -133,21 +139,26 @@ pub fn quoted(text: &str) -> String {
     quoted
 }
 
+/// Message for a malformed `--set` value.
+pub(super) const MALFORMED_SET: &str = "malformed value";
+/// Hint for a `--set` value without `=`.
+pub(super) const MISSING_EQUALS_HELP: &str = "add `=` between the key and its value, as in render.samples=3";
+
 fn malformed(set: &str) -> Diagnostic {
     let place =
-        Place { source: set.into(), span: 0..set.len(), label: "this is not TABLE.KEY=VALUE".to_owned() };
+        SourceSpan { source: set.into(), span: 0..set.len(), label: "expected TABLE.KEY=VALUE".to_owned() };
     let key = set.split('=').next().unwrap_or_default();
     let help = if !set.contains('=') {
-        "there is no `=` between what to set and its value, as in render.samples=3"
+        MISSING_EQUALS_HELP
     } else if key.contains(|c: char| c.is_whitespace() || !c.is_ascii()) {
-        "a name of more than letters, digits, - and _ stands in quotes, as in --set 'sphere.\"back wall\".radius=.3'"
+        "quote names with characters other than letters, digits, - and _, as in --set 'sphere.\"back wall\".radius=.3'"
     } else {
-        "such as render.samples=3, materials.wall.diffuse=0.5, sphere.2.radius=.3 or sphere.ball.radius=.3"
+        "examples: render.samples=3, materials.wall.diffuse=0.5, sphere.2.radius=.3, sphere.ball.radius=.3"
     };
     Diagnostic {
         severity: Severity::Error,
-        message: "this does not say what to set".to_owned(),
-        path: PathBuf::from(CALL),
+        message: MALFORMED_SET.to_owned(),
+        path: PathBuf::from(SET_OPTION),
         place: Some(place),
         help: Some(help.to_owned()),
     }
@@ -158,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_value_of_toml_is_a_text() {
+    fn other_values_become_strings() {
         for (set, text) in [
             ("render.samples=3", "render.samples = 3"),
             (" camera.position = [0, 1,\n 4] ", "camera.position = [0, 1,\n 4]"),

@@ -23,7 +23,7 @@ use crate::pipeline::protocol::{
 };
 use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
 use crate::scene::description::{Accel, Integrator, Pose, Shadows};
-use crate::scene::diagnostic::{Diagnostic, Place, Severity};
+use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
 pub(super) fn window(columns: u16, rows: u16) -> Window {
     Window { columns, rows, cell_aspect: 2.0, cell_pixels: (8, 16) }
@@ -252,7 +252,7 @@ pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
         severity,
         message: message.to_owned(),
         path: PathBuf::from("scenes/cornell.toml"),
-        place: Some(Place { source, span: 19..25, label: "here".to_owned() }),
+        place: Some(SourceSpan { source, span: 19..25, label: "here".to_owned() }),
         help: Some("did you mean `height`?".to_owned()),
     }
 }

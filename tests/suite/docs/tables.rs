@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use glimt::scene::description::Scene;
 use glimt::scene::diagnostic::Diagnostic;
-use glimt::scene::keys::key::{Default, Form, KeyInfo, Kind, TableInfo, TypeInfo};
+use glimt::scene::keys::key::{Default, Form, KeyInfo, ValueKind, TableInfo, TypeInfo};
 use glimt::scene::keys::{self, limits::Limits};
 use glimt::scene::parse;
 
@@ -153,26 +153,26 @@ impl Key {
     fn range(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         match self.info.kind {
             // Keys for glTF files, which the scene of this test does not use.
-            Kind::Whole(..) if self.info.default == Default::Absent => None,
-            Kind::Whole(least, most) => {
+            ValueKind::Whole(..) if self.info.default == Default::Absent => None,
+            ValueKind::Whole(least, most) => {
                 Some((vec![least as f64, most as f64], vec![least as f64 - 1.0, most as f64 + 1.0]))
             }
-            Kind::Number(limits)
-            | Kind::Color(limits)
-            | Kind::ColorOrTexture(limits)
-            | Kind::Emission(limits)
-            | Kind::NumberOrTexture(limits)
-            | Kind::Scale(limits) => ends(limits),
+            ValueKind::Number(limits)
+            | ValueKind::Color(limits)
+            | ValueKind::ColorOrTexture(limits)
+            | ValueKind::Emission(limits)
+            | ValueKind::NumberOrTexture(limits)
+            | ValueKind::Scale(limits) => ends(limits),
             // A direction must not be zero, and a matrix has a fixed last row.
-            Kind::Numbers(count, _, limits) if limits != Limits::Any || count == 2 => ends(limits),
-            Kind::Numbers(..) => None,
-            Kind::Flag
-            | Kind::Words(_)
-            | Kind::Text
-            | Kind::File(_)
-            | Kind::Texture
-            | Kind::Heights
-            | Kind::Material => None,
+            ValueKind::Numbers(count, _, limits) if limits != Limits::Any || count == 2 => ends(limits),
+            ValueKind::Numbers(..) => None,
+            ValueKind::Flag
+            | ValueKind::Words(_)
+            | ValueKind::Text
+            | ValueKind::File(_)
+            | ValueKind::Texture
+            | ValueKind::Heights
+            | ValueKind::Material => None,
         }
     }
 }
@@ -194,7 +194,7 @@ fn ends(limits: Limits) -> Option<(Vec<f64>, Vec<f64>)> {
 fn is_row(row: &[String], key: &KeyInfo) -> bool {
     let [name, kind, unit, range, default, meaning] = row else { return false };
     let has_kind =
-        *kind == key.kind() || matches!(key.kind, Kind::Words(_)) && codes(kind) == codes(&key.kind());
+        *kind == key.kind() || matches!(key.kind, ValueKind::Words(_)) && codes(kind) == codes(&key.kind());
     let meaning = unlinked(meaning);
     let rest = meaning.strip_prefix(key.doc);
     *name == format!("`{}`", key.name)
@@ -268,9 +268,9 @@ fn defined_defaults_match_the_program() {
 }
 
 /// A number as a value of a type.
-fn value(kind: Kind, number: f64) -> String {
+fn value(kind: ValueKind, number: f64) -> String {
     match kind {
-        Kind::Numbers(count, ..) => format!("[{}]", vec![number.to_string(); count].join(", ")),
+        ValueKind::Numbers(count, ..) => format!("[{}]", vec![number.to_string(); count].join(", ")),
         _ => number.to_string(),
     }
 }
@@ -289,7 +289,7 @@ fn defined_choices_match_the_program() {
     let mut count = 0;
     for table in tables() {
         for key in &table.keys {
-            let Kind::Words(list) = key.info.kind else { continue };
+            let ValueKind::Words(list) = key.info.kind else { continue };
             let words: BTreeSet<String> = list().iter().map(|word| format!("\"{}\"", word.name)).collect();
             let said = table.said(key, "\"zzz\"");
             let wrong =

@@ -1,4 +1,4 @@
-//! Values that shells offer for arguments: files by their endings, and the keys of `--set`.
+//! Completion candidates for arguments: files by extension, and keys for `--set`.
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
@@ -6,20 +6,20 @@ use std::sync::OnceLock;
 
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
-use crate::scene::keys::key::{Form, KeyInfo, Kind};
+use crate::scene::keys::key::{Form, KeyInfo, ValueKind};
 use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
-/// Words of the line that a shell completes, if its script passes the line in another form.
+/// Words of the command line being completed, if the shell's script passes it in another form.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// Keeps the words of the line for completers that look at other words than theirs.
+/// Stores the words of the command line, for completers that need other arguments.
 pub(crate) fn remember(words: &[OsString]) {
     WORDS.get_or_init(|| words.to_vec());
 }
 
-/// Returns the words of the line that is completed.
+/// Returns the words of the command line being completed.
 fn line() -> Vec<OsString> {
     WORDS.get().cloned().unwrap_or_else(|| std::env::args_os().collect())
 }
@@ -44,7 +44,7 @@ fn is_scene(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Completes `TABLE.KEY=VALUE`: the keys of the scene that is named before it, else of every table that each scene may have.
+/// Completes `TABLE.KEY=VALUE` with the keys of the scene on the command line, or else of the tables that every scene has.
 pub(crate) fn sets() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
@@ -54,7 +54,7 @@ pub(crate) fn sets() -> ArgValueCompleter {
     })
 }
 
-/// Completes the paths of keys, as `glimt explain` takes them.
+/// Completes key paths for `glimt explain`.
 pub(crate) fn keys() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
@@ -64,10 +64,10 @@ pub(crate) fn keys() -> ArgValueCompleter {
     })
 }
 
-/// The candidates for what is typed so far, in a scene of this text.
+/// Candidates for the prefix `typed`, in a scene with this text.
 fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
-    /// Nobody reads on from here.
-    const MOST: usize = 2000;
+    /// Most candidates.
+    const MAX_CANDIDATES: usize = 2000;
     let outline = outline(text);
     let singles = tables().iter().filter(|table| table.form == Form::Single);
     let absent = singles.filter(|info| !outline.iter().any(|table| table.info.name == info.name));
@@ -83,23 +83,23 @@ fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
     };
     let of_type = |table: &OutlineTable| {
         let types = table.info.types.iter().map(|kind| (kind.name.to_owned(), kind.doc));
-        let types: Vec<Value> = types.collect();
+        let types: Vec<DescribedValue> = types.collect();
         let paths = if types.is_empty() { Vec::new() } else { table.paths() };
         let of_path = |path: String| of_path(&format!("{path}.type="), "The type", typed, || types.clone());
         paths.into_iter().flat_map(of_path).collect::<Vec<_>>()
     };
-    keys.flat_map(of_key).chain(outline.iter().flat_map(of_type)).take(MOST).collect()
+    keys.flat_map(of_key).chain(outline.iter().flat_map(of_type)).take(MAX_CANDIDATES).collect()
 }
 
 /// A value and its description.
-type Value = (String, &'static str);
+type DescribedValue = (String, &'static str);
 
-/// The candidates for one path with its `=`: itself, or once it is typed, its values.
+/// Candidates for one path with its `=`: the path, or its values once the path is complete.
 fn of_path(
     path: &str,
     doc: &str,
     typed: &str,
-    values: impl FnOnce() -> Vec<Value>,
+    values: impl FnOnce() -> Vec<DescribedValue>,
 ) -> Vec<CompletionCandidate> {
     let help = |text: &str| Some(text.replace('`', "").into());
     if path.starts_with(typed) && path != typed {
@@ -110,24 +110,26 @@ fn of_path(
     fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(doc))).collect()
 }
 
-/// The values of a kind that have names, in a scene of these tables.
-fn values(kind: Kind, outline: &[OutlineTable]) -> Vec<Value> {
+/// The named values of a type, in a scene with these tables.
+fn values(kind: ValueKind, outline: &[OutlineTable]) -> Vec<DescribedValue> {
     let plain = |value: &str| (value.to_owned(), "");
     match kind {
-        Kind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),
-        Kind::Flag => ["true", "false"].map(plain).to_vec(),
-        Kind::Color(_) | Kind::ColorOrTexture(_) | Kind::Emission(_) => color_names().map(plain).collect(),
-        Kind::Texture | Kind::Heights | Kind::Material => {
+        ValueKind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),
+        ValueKind::Flag => ["true", "false"].map(plain).to_vec(),
+        ValueKind::Color(_) | ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) => {
+            color_names().map(plain).collect()
+        }
+        ValueKind::Texture | ValueKind::Heights | ValueKind::Material => {
             let named = outline.iter().filter(|table| Some(table.info.name) == kind.named_in());
             named.filter_map(|table| table.name.as_ref()).map(|name| plain(&name.text)).collect()
         }
-        Kind::Whole(..)
-        | Kind::Number(_)
-        | Kind::Text
-        | Kind::File(_)
-        | Kind::NumberOrTexture(_)
-        | Kind::Numbers(..)
-        | Kind::Scale(_) => Vec::new(),
+        ValueKind::Whole(..)
+        | ValueKind::Number(_)
+        | ValueKind::Text
+        | ValueKind::File(_)
+        | ValueKind::NumberOrTexture(_)
+        | ValueKind::Numbers(..)
+        | ValueKind::Scale(_) => Vec::new(),
     }
 }
 
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_are_those_of_the_scene() {
+    fn set_completes_keys_of_the_scene() {
         let text = "[materials.wall]\ntype = \"mirror\"\n[[sphere]]\nname = \"ball\"\n";
         let mirror = offered(text, "materials.wall.ref");
         assert_eq!(mirror, ["materials.wall.reflectance="]);
@@ -156,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn values_are_offered_once_the_key_is_there() {
+    fn set_completes_values_after_the_key() {
         assert_eq!(
             offered("", "render.integrator="),
             ["render.integrator=whitted", "render.integrator=path"]

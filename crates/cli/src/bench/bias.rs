@@ -120,7 +120,7 @@ mod tests {
             ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
         }
 
-        /// Grey of 0.5 + offset; blocks of `block`² pixels share their noise, as the light of a photon is spread.
+        /// Gray of 0.5 + offset; blocks of `block`² pixels share their noise, as the light of a photon is spread.
         fn picture(&mut self, noise: f32, offset: f32, block: u32) -> RadianceImage {
             const SIDE: u32 = 32;
             let mut picture = RadianceImage::black(SIDE, SIDE);

@@ -81,7 +81,7 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// Grey of 0.5, brighter by a part, with noise of each pixel or of the whole picture.
+    /// Gray of 0.5, brighter by a part, with noise of each pixel or of the whole picture.
     fn picture(next: &mut impl FnMut() -> f32, brighter: f32, noise: f32, shared: f32) -> RadianceImage {
         let all = shared * (2.0 * next() - 1.0);
         let pixels = (0..SIDE * SIDE)

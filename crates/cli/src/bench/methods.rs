@@ -81,7 +81,7 @@ fn or_own<T: Copy>(asked: &[T], own: T) -> Vec<T> {
 
 fn way(integrator: Integrator, photons: bool, shadows: Shadows, clamp: f32, accel: Accel) -> Way {
     let method = integrator.method();
-    let of_whitted = (method.gathers && method.honours_shadows).then_some((photons, shadows));
+    let of_whitted = (method.gathers && method.honors_shadows).then_some((photons, shadows));
     Way { integrator, of_whitted, clamp, accel }
 }
 

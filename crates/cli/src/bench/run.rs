@@ -315,7 +315,7 @@ mod tests {
         }
     }
 
-    /// A sky of one colour.
+    /// A sky of one color.
     fn write(scene: &Path, color: &str) {
         let text =
             format!("[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n[environment]\ncolor = {color}\n");

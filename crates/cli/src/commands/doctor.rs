@@ -65,12 +65,12 @@ fn terminal(probe: &Probe) -> Vec<(&'static str, String)> {
         (false, false) => "",
     };
     let terminal = format!("{}, {size}{way}", name.map_or(term.clone(), |name| format!("{name} ({term})")));
-    let mut lines = vec![("terminal", terminal), ("colours", colours(probe)), ("preview", preview(probe))];
+    let mut lines = vec![("terminal", terminal), ("colors", colors(probe)), ("preview", preview(probe))];
     lines.push(("round trip", round_trip(probe.answers.as_ref())));
     lines
 }
 
-fn colours(probe: &Probe) -> String {
+fn colors(probe: &Probe) -> String {
     let depth = match probe.depth {
         ColorDepth::TrueColor => "24 bits",
         ColorDepth::Indexed256 => "256",

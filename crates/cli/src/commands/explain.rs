@@ -2,7 +2,7 @@
 
 use crate::console::{Console, answer_columns};
 use crate::exit::Exit;
-use crate::scene::keys::key::{Default, KeyInfo, Kind, TableInfo, TypeInfo};
+use crate::scene::keys::key::{Default, KeyInfo, TableInfo, TypeInfo, ValueKind};
 use crate::scene::keys::{paths, table, tables};
 use crate::scene::nearest::{meant, nearest};
 use crate::scene::sanitize::shortened;
@@ -134,7 +134,7 @@ fn one(path: &str, key: &KeyInfo) -> String {
         },
     );
     row("example", format!("{} = {}", key.name, key.example()));
-    if let Kind::Words(list) = key.kind {
+    if let ValueKind::Words(list) = key.kind {
         text.push('\n');
         for word in list() {
             text.push_str(&format!("    {:<13}{}\n", format!("\"{}\"", word.name), word.meaning));

@@ -12,7 +12,7 @@ use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, ignore_progress};
 use crate::plan::cores;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::load_made;
+use crate::scene::load_generated;
 use crate::stages::containers::Containers;
 use crate::system::threads::{check_stack_space, start_failure};
 
@@ -84,7 +84,7 @@ fn pool() -> Result<ThreadPool, String> {
 /// Refuses a scene that `glimt check` would refuse. It reads the text that `glimt MODEL` shows, whose files are there.
 fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
     let shown = super::gltf::text(path, (Show::default(), &Naming::Inside), containers, token)?;
-    let Err(errors) = load_made(shown.text.into(), path, &[]) else { return Ok(()) };
+    let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
     // Files have other names where the scene is written.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };

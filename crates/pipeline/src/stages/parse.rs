@@ -70,7 +70,7 @@ fn model_scene(
             broken(&path, format!("{line}{reason}"))
         }
     })?;
-    let loaded = scene::load_made(made.text.as_str().into(), path, sets);
+    let loaded = scene::load_generated(made.text.as_str().into(), path, sets);
     let loaded = loaded.map_err(|errors| {
         let shown = |one: Diagnostic| if one.path == path { model::in_its_scene(one) } else { one };
         Stop::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))

@@ -6,74 +6,74 @@ use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
 use crate::math::DVec3;
 
-/// The view.
+/// The camera of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Camera {
-    /// Given by vectors; `position` ≠ `look_at`, `up` not parallel to the view.
+    /// A camera given by vectors, with `position` ≠ `look_at` and `up` not parallel to the view direction.
     LookAt {
-        /// The eye.
+        /// Position of the camera.
         position: DVec3,
-        /// The point in the middle of the picture.
+        /// The point at the center of the image.
         look_at: DVec3,
-        /// Up in the picture.
+        /// Up direction in the image.
         up: DVec3,
-        /// Vertical whole angle in degrees, in (0, 180).
+        /// Vertical field of view in degrees, in (0, 180).
         fov: f64,
         /// Lens radius, ≥ 0.
         aperture: f64,
-        /// Distance along the view axis to the plane in focus, > 0.
+        /// Focus distance along the view axis, > 0.
         focus: f64,
     },
     /// A gKit orbiter file, resolved against the scene's folder.
     Orbiter {
         /// The file.
         file: Located<PathBuf>,
-        /// Vertical whole angle in degrees, in (0, 180). `None` for the file's angle.
+        /// Vertical field of view in degrees, in (0, 180). `None` to use the file's.
         fov: Option<f64>,
         /// Lens radius, ≥ 0.
         aperture: f64,
-        /// Distance to the plane in focus. `None` for the file's distance to its centre.
+        /// Focus distance. `None` for the file's distance to its center.
         focus: Option<f64>,
     },
 }
 
-/// A camera by vectors, however the scene gives it. What [`Camera::LookAt`] says of its fields holds.
+/// A camera given by vectors, from either kind of [`Camera`]. Fields have the invariants of [`Camera::LookAt`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
     /// Position and orientation.
     pub pose: Pose,
-    /// Vertical whole angle in degrees.
+    /// Vertical field of view in degrees.
     pub fov: f64,
     /// Lens radius.
     pub aperture: f64,
-    /// Distance along the view axis to the plane in focus.
+    /// Focus distance along the view axis.
     pub focus: f64,
 }
 
-/// Position of a camera, the point that it looks at, and its upward direction.
+/// Position and orientation of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// The eye.
+    /// Position of the camera.
     pub position: DVec3,
-    /// The point in the middle of the picture.
+    /// The point at the center of the image.
     pub look_at: DVec3,
-    /// Up in the picture.
+    /// Up direction in the image.
     pub up: DVec3,
 }
 
-/// Changes of a camera; `None` leaves its own.
+/// A change of a camera. `None` keeps a value.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraChange {
     /// Position and orientation.
     pub pose: Option<Pose>,
-    /// Vertical whole angle in degrees, in (0, 180).
+    /// Vertical field of view in degrees, in (0, 180).
     pub fov: Option<f64>,
-    /// Distance to the plane in focus, > 0.
+    /// Focus distance, > 0.
     pub focus: Option<f64>,
 }
 
 impl Pose {
-    /// From the eye to the point that it looks at.
+    /// Distance from the camera to `look_at`.
     pub fn distance(&self) -> f64 {
         self.position.distance(self.look_at)
     }
@@ -87,7 +87,7 @@ impl CameraChange {
 }
 
 impl Viewpoint {
-    /// With a change. Where the plane in focus goes through `look_at`, as it does in a scene that does not say, it stays there.
+    /// Applies a change. If the focal plane passes through `look_at`, which is the default, it continues to do so.
     pub fn changed(&self, change: &CameraChange) -> Self {
         let pose = change.pose.unwrap_or(self.pose);
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };
@@ -99,7 +99,7 @@ impl Viewpoint {
         }
     }
 
-    /// Whether the plane in focus goes through `look_at`.
+    /// Whether the focal plane passes through `look_at`.
     pub fn is_focused_on_look_at(&self) -> bool {
         self.focus == self.pose.distance()
     }
@@ -112,14 +112,14 @@ impl From<Viewpoint> for Camera {
     }
 }
 
-/// Whether two distances differ by no more than the rounding of a camera's steps; a step nearer is fifty times as long.
+/// Whether two distances are equal up to the rounding of camera steps. A step towards `look_at` is fifty times as long.
 pub fn is_same_distance(a: f64, b: f64) -> bool {
     const ROUNDING: f64 = 1e-3;
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 impl Camera {
-    /// Whether it is this view, but for what rounding makes of the distance to what is in focus.
+    /// Whether the camera has this viewpoint, up to rounding of the focus distance.
     pub fn is_nearly(&self, view: &Viewpoint) -> bool {
         match self {
             Self::LookAt { focus, .. } if is_same_distance(*focus, view.focus) => {
@@ -143,9 +143,9 @@ impl Fingerprinted for Camera {
             Self::LookAt { position, look_at, up, fov, aperture, focus } => {
                 key.index(0).dvec3(*position).dvec3(*look_at).dvec3(*up).f64(*fov).f64(*aperture).f64(*focus);
             }
-            // What the file says counts, not its name.
+            // Hash the file's content, not its name.
             Self::Orbiter { file: _, fov, aperture, focus } => {
-                // 0 is no valid angle and no valid distance.
+                // 0 is neither a valid angle nor a valid distance.
                 key.index(1).f64(*aperture).f64(fov.unwrap_or(0.0)).f64(focus.unwrap_or(0.0));
                 key.text(of.orbiter.unwrap_or(""));
             }

@@ -7,65 +7,65 @@ use super::Located;
 pub use crate::lights::delta::Falloff;
 use crate::math::{DVec3, Vec3};
 
-/// A light that is no shape.
+/// A light that is not a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
-    /// Without extent.
+    /// A point light.
     Point(PointLight),
-    /// Without extent, into a cone.
+    /// A spotlight.
     Spot(SpotLight),
-    /// From beyond the scene.
+    /// A distant light.
     Directional(DirectionalLight),
 }
 
-/// A light without extent.
+/// A point light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointLight {
     /// Position.
     pub position: DVec3,
-    /// W·sr⁻¹; with [`Falloff::None`] irradiance at normal incidence.
+    /// Radiant intensity in W·sr⁻¹. With [`Falloff::None`], irradiance at normal incidence.
     pub intensity: Vec3,
-    /// Fall of the light with distance.
+    /// Falloff with distance.
     pub falloff: Falloff,
 }
 
-/// A light without extent that shines into a cone.
+/// A point light that shines into a cone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpotLight {
-    /// The light on its axis.
+    /// Position, and intensity on the axis.
     pub point: PointLight,
-    /// A point on its axis, not the light's own.
+    /// A point on the axis, different from the position.
     pub look_at: DVec3,
-    /// The whole cone, in degrees, in (0, 360).
+    /// Full apex angle of the cone in degrees, in (0, 360).
     pub angle: f64,
-    /// The outer part of the half angle over which it fades, in [0, 1].
+    /// Outer fraction of the half angle where the light fades out, in [0, 1].
     pub blend: f32,
 }
 
-/// Light from far away.
+/// A distant light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DirectionalLight {
-    /// The way that it travels, of any length but 0.
+    /// Direction in which the light travels, of any nonzero length.
     pub direction: DVec3,
-    /// On a surface that faces it.
+    /// Irradiance at normal incidence.
     pub irradiance: Vec3,
     /// Apparent diameter in degrees, up to 180; 0 for no extent.
     pub angle: f64,
 }
 
-/// Light from all around: `[environment]`.
+/// Light from all directions: `[environment]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
-    /// Radiance; with a map, what its numbers are multiplied by.
+    /// Radiance, or a factor on the map.
     pub color: Vec3,
     /// An equirectangular map, resolved against the scene's folder.
     pub file: Option<Located<PathBuf>>,
-    /// Turn of the map about +y, in degrees, counterclockwise seen from above.
+    /// Rotation of the map about +y, in degrees, counterclockwise seen from above.
     pub rotate: f64,
 }
 
 impl Light {
-    /// Whether it is not black.
+    /// Whether the light is not black.
     pub fn sends(&self) -> bool {
         let color = match self {
             Self::Point(light) => light.intensity,
@@ -75,7 +75,7 @@ impl Light {
         color != Vec3::ZERO
     }
 
-    /// Whether it is without extent, so that no ray finds it.
+    /// Whether the light is a δ distribution, so rays cannot hit it.
     pub fn is_sharp(&self) -> bool {
         match self {
             Self::Point(_) | Self::Spot(_) => true,
@@ -83,7 +83,7 @@ impl Light {
         }
     }
 
-    /// Whether distance does not weaken it.
+    /// Whether the light has no falloff with distance.
     pub fn is_steady(&self) -> bool {
         match self {
             Self::Point(light) => light.falloff == Falloff::None,
@@ -94,7 +94,7 @@ impl Light {
 }
 
 impl Environment {
-    /// Whether it is not black, but for its map.
+    /// Whether the color is not black. Ignores the map.
     pub fn sends(&self) -> bool {
         self.color != Vec3::ZERO
     }
@@ -122,7 +122,7 @@ impl Fingerprinted for PointLight {
     }
 }
 
-/// Key of the look-up; the texels have a key of their own.
+/// Fingerprint of the lookup. Texels have a separate fingerprint.
 impl Fingerprinted for Environment {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { color, file, rotate } = self;

@@ -10,49 +10,49 @@ pub use crate::materials::texture::{TextureFilter, Wrap};
 pub use crate::materials::{Channel, EmissionSides, PixelValue};
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// An image that materials look up.
+/// An image used by materials.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// Its name in the scene.
     pub name: String,
     /// Its file, resolved against the scene's folder.
     pub file: Located<PathBuf>,
-    /// Number of the image in a glTF file. `None` if the file is an image.
+    /// Index of the image in a glTF file. `None` if the file is an image.
     pub image: Option<u32>,
     /// Interpolation.
     pub filter: TextureFilter,
-    /// Outside [0, 1].
+    /// Addressing mode outside of [0, 1].
     pub wrap: Wrap,
-    /// Repetitions in u and v; not 0.
+    /// Tiling factors of u and v, not 0.
     pub repeat: Vec2,
     /// Rotation of the repeated coordinates, in degrees from u to v.
     pub rotate: f64,
-    /// Offset of the coordinates after that.
+    /// Offset of the coordinates, added last.
     pub offset: Vec2,
-    /// Coordinates by which it is looked up.
+    /// Texture coordinate set.
     pub uv: UvSet,
-    /// Meaning of its numbers.
+    /// Encoding of the pixels.
     pub encoding: Encoding,
-    /// Factor on the linear colours and numbers that are looked up, not on normals and heights.
+    /// Factor on linear colors and numbers. Not applied to normals and heights.
     pub factor: Vec3,
 }
 
 choice! {
-    /// Meaning of a texture's numbers.
+    /// Encodings of textures.
     pub enum Encoding {
-        /// sRGB for colours in 8 and 16 bits, linear for numbers, normal maps and float files.
+        /// sRGB for 8- and 16-bit colors, linear for numbers, normal maps and floating-point files.
         Auto = "auto",
         /// sRGB, decoded.
         Srgb = "srgb",
-        /// Used as they are.
+        /// Linear, used unchanged.
         Linear = "linear",
     }
 }
 
-/// A colour or a texture.
+/// A color or a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ColorSource {
-    /// The same everywhere.
+    /// A constant color.
     Constant(Vec3),
     /// Index into [`Scene::textures`](super::Scene::textures).
     Texture(usize),
@@ -61,19 +61,19 @@ pub enum ColorSource {
 /// A number or a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NumberSource {
-    /// The same everywhere.
+    /// A constant number.
     Constant(f32),
-    /// The numbers of a texture.
+    /// A channel of a texture.
     Texture {
         /// Index into [`Scene::textures`](super::Scene::textures).
         texture: usize,
-        /// The channel that holds them. `None` for the usual number of a pixel.
+        /// The channel. `None` for the default of the key.
         channel: Option<Channel>,
     },
 }
 
 impl NumberSource {
-    /// The number, if it is the same everywhere.
+    /// The number, if it is constant.
     pub fn constant(&self) -> Option<f32> {
         match *self {
             Self::Constant(number) => Some(number),
@@ -81,7 +81,7 @@ impl NumberSource {
         }
     }
 
-    /// The texture and its number of each pixel, if it is one; without a channel, the number is `usual`.
+    /// The texture and how to get the number from a pixel, which is `usual` without a channel. `None` if constant.
     pub fn texture(&self, usual: PixelValue) -> Option<(usize, PixelValue)> {
         match *self {
             Self::Constant(_) => None,
@@ -90,20 +90,20 @@ impl NumberSource {
     }
 }
 
-/// The chance that a surface is there.
+/// Opacity of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpacitySource {
-    /// The chance in [0, 1].
+    /// The opacity, in [0, 1].
     pub value: NumberSource,
-    /// The chance from which the surface is there, below which it is not; 0 for none.
+    /// Threshold for alpha testing, or 0 to disable it.
     pub cutoff: f32,
 }
 
 impl OpacitySource {
-    /// A surface that is there.
+    /// A fully opaque surface.
     pub const FULL: Self = Self { value: NumberSource::Constant(1.0), cutoff: 0.0 };
 
-    /// Whether the surface is there everywhere.
+    /// Whether the surface is opaque everywhere.
     pub fn is_full(&self) -> bool {
         match self.value {
             NumberSource::Constant(value) => value >= 1.0 || self.cutoff > 0.0 && value >= self.cutoff,
@@ -111,7 +111,7 @@ impl OpacitySource {
         }
     }
 
-    /// The texture and its number of each pixel, if it has one.
+    /// The texture and how to get the opacity from a pixel. `None` if constant.
     pub fn texture(&self) -> Option<(usize, PixelValue)> {
         self.value.texture(PixelValue::Opacity)
     }
@@ -120,9 +120,9 @@ impl OpacitySource {
 /// Reflectance of a smooth conductor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FresnelSource {
-    /// Schlick's approximation, by the reflectance at normal incidence.
+    /// Schlick's approximation with the reflectance at normal incidence.
     Schlick(ColorSource),
-    /// Exact equations, by the complex index of refraction.
+    /// Fresnel equations with the complex index of refraction.
     Index {
         /// Its real part.
         eta: ColorSource,
@@ -131,10 +131,10 @@ pub enum FresnelSource {
     },
 }
 
-/// Radiance, the same everywhere or by a texture.
+/// Emitted radiance, constant or textured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionSource {
-    /// The radiance; with a texture, what that is multiplied by.
+    /// The radiance, or a factor on the texture.
     pub scale: Vec3,
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: Option<usize>,
@@ -143,10 +143,10 @@ pub struct EmissionSource {
 }
 
 impl EmissionSource {
-    /// None.
+    /// No emission.
     pub const NONE: Self = Self::constant(Vec3::ZERO);
 
-    /// The same everywhere on the front.
+    /// Constant radiance from the front.
     pub const fn constant(radiance: Vec3) -> Self {
         Self { scale: radiance, texture: None, sides: EmissionSides::Front }
     }
@@ -157,15 +157,15 @@ impl EmissionSource {
 pub struct Material {
     /// Its name in the scene.
     pub name: String,
-    /// Its reflection or transmission of light.
+    /// Reflection and transmission.
     pub kind: MaterialKind,
-    /// Radiance.
+    /// Emitted radiance.
     pub emission: EmissionSource,
-    /// The map that bends the shading normals.
+    /// The normal map.
     pub normal_map: Option<NormalMap>,
-    /// The heights that bend them further.
+    /// The height map, applied after the normal map.
     pub bump: Option<Bump>,
-    /// The chance that it is there.
+    /// Opacity.
     pub opacity: OpacitySource,
 }
 
@@ -182,7 +182,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it has a δ lobe: as mirrors, glass and smooth coats have.
+    /// Whether it has a δ lobe, as mirrors, smooth glass and smooth coats do.
     pub fn has_delta(&self) -> bool {
         match self {
             Self::Phong { .. } | Self::Principled { .. } => false,
@@ -193,7 +193,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether light goes straight on where it borders on air: glass of index 1, however rough.
+    /// Whether it is glass of index 1, which does not refract in air, even if it is rough.
     pub fn is_like_air(&self) -> bool {
         match self {
             Self::Glass { ior, .. } => *ior == 1.0,
@@ -206,7 +206,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it depends on the direction of texture coordinates.
+    /// Whether it is anisotropic, so it depends on the direction of texture coordinates.
     pub fn has_direction(&self) -> bool {
         match self {
             Self::Metal { anisotropy, .. } => *anisotropy != NumberSource::Constant(0.0),
@@ -219,7 +219,7 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it has a colour, which vertex colours multiply.
+    /// Whether it has a color that vertex colors can multiply.
     pub fn has_color(&self) -> bool {
         match self {
             Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
@@ -232,12 +232,12 @@ impl MaterialKind {
         }
     }
 
-    /// Whether it is glass that fills its shape.
+    /// Whether it is solid glass.
     pub fn is_glass(&self) -> bool {
         self.substance().is_some()
     }
 
-    /// The bits of what glass is made of: index of refraction and transmittance, however rough its surface is. `None` if it is not glass.
+    /// The bits of the index of refraction and transmittance of solid glass, regardless of roughness. `None` for other materials.
     pub fn substance(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint, roughness: _ } => {
@@ -258,34 +258,34 @@ impl MaterialKind {
 pub struct NormalMap {
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: usize,
-    /// Factor on its slopes, ≥ 0.
+    /// Factor on the slopes, ≥ 0.
     pub strength: f32,
 }
 
-/// A texture of heights.
+/// A height map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bump {
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: usize,
-    /// The channel that holds the heights. `None` for luminance.
+    /// The channel with the heights. `None` for luminance.
     pub channel: Option<Channel>,
-    /// Length of a height of 1; below 0, what stood out is sunk.
+    /// Displacement of white. Negative values invert the relief.
     pub scale: f32,
 }
 
 impl Bump {
-    /// The number of a pixel that is its height.
+    /// How to get the height from a pixel.
     pub fn number(&self) -> PixelValue {
         self.channel.map_or(PixelValue::Luminance, PixelValue::Channel)
     }
 }
 
-/// Purpose of a texture's look-up.
+/// Interpretation of a texture's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
-    /// Colours.
+    /// Colors.
     Color,
-    /// Colors of a surface whose opacity is the alpha of the same image.
+    /// Colors of a surface whose opacity is the image's alpha channel.
     CutOut,
     /// Normals.
     Normal,
@@ -302,24 +302,24 @@ pub enum TextureRole {
     Specular,
     /// ka.
     Ambient,
-    /// Reflectance of microfacets, by normal incidence or by the index of refraction.
+    /// Reflectance or index of refraction of microfacets.
     Facets,
-    /// Roughness, and other numbers of microfacets.
+    /// Roughness and other parameters of microfacets.
     Roughness(PixelValue),
     /// Radiance.
     Emission,
-    /// Map that bends its normals.
+    /// Normal map.
     NormalMap,
-    /// Heights that bend its normals.
+    /// Height map.
     Bump(PixelValue),
-    /// The chance that it is there.
+    /// Opacity.
     Opacity(PixelValue),
-    /// Clear coat over what emits.
+    /// Clear coat over an emitter.
     EmissionCoat(PixelValue),
 }
 
 impl TextureRole {
-    /// Meaning of its numbers.
+    /// How the pixels are interpreted.
     pub fn texture_use(self) -> TextureUse {
         match self {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Facets | Self::Emission => {
@@ -334,10 +334,10 @@ impl TextureRole {
     }
 }
 
-/// Reflection or transmission of light by a material.
+/// Reflection and transmission of a material.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MaterialKind {
-    /// Normalised Phong.
+    /// Normalized Phong.
     Phong {
         /// kd.
         diffuse: ColorSource,
@@ -345,75 +345,75 @@ pub enum MaterialKind {
         specular: ColorSource,
         /// α ≥ 0.
         shininess: f32,
-        /// ka. `None` for the diffuse colour.
+        /// ka. `None` for the diffuse color.
         ambient: Option<ColorSource>,
     },
-    /// A perfect mirror of this reflectance in [0, 1].
+    /// A perfect mirror.
     Mirror {
-        /// Reflectance.
+        /// Reflectance, in [0, 1].
         reflectance: ColorSource,
     },
     /// Smooth or rough dielectric.
     Glass {
-        /// Index of refraction inside, in [0.1, 10]; below 1: thinner than what is outside, as a bubble in water.
+        /// Index of refraction inside, in [0.1, 10]. Below 1 it is optically thinner than the outside, like a bubble in water.
         ior: f32,
         /// Transmittance per unit of length inside, in [0, 1].
         tint: DVec3,
-        /// The root of α, in [0, 1]; 0 is smooth.
+        /// Square root of the GGX α, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
     },
-    /// A pane of smooth glass without thickness.
+    /// An infinitely thin pane of smooth glass.
     Pane {
         /// Index of refraction, in [0.1, 10].
         ior: f32,
         /// Transmittance of the glass at any angle, in [0, 1].
         tint: ColorSource,
     },
-    /// Conductor of microfacets.
+    /// A conductor with a microfacet surface.
     Metal {
-        /// Reflectance of the facets.
+        /// Fresnel reflectance of the facets.
         fresnel: FresnelSource,
-        /// The root of α, in [0, 1]; 0 is a mirror.
+        /// Square root of the GGX α, in [0, 1]; 0 is a mirror.
         roughness: NumberSource,
-        /// Stretch of the lobe along u, in [−1, 1].
+        /// Stretch of the highlight along u, in [−1, 1].
         anisotropy: NumberSource,
     },
-    /// A diffuse base under a dielectric coat of microfacets.
+    /// A diffuse base under a dielectric microfacet coat.
     Plastic {
         /// kd, in [0, 1].
         diffuse: ColorSource,
-        /// Factor on what the coat reflects, in [0, 1].
+        /// Factor on the reflectance of the coat, in [0, 1].
         specular: ColorSource,
         /// Index of refraction, in [1, 10].
         ior: f32,
-        /// The root of α, in [0, 1]; 0 is a smooth coat.
+        /// Square root of the GGX α of the coat, in [0, 1]; 0 is smooth.
         roughness: NumberSource,
     },
-    /// The inputs of glTF. Colours and numbers are in [0, 1] but for `ior` and `specular_color`.
+    /// The material model of glTF. Colors and numbers are in [0, 1], except for `ior` and `specular_color`.
     Principled {
-        /// Diffuse reflectance, or that of the metal at normal incidence.
+        /// Diffuse reflectance of the dielectric part, and reflectance of the metal at normal incidence.
         color: ColorSource,
         /// Weight of the metal.
         metallic: NumberSource,
-        /// The root of α.
+        /// Square root of the GGX α.
         roughness: NumberSource,
         /// Index of refraction, in [1, 10].
         ior: f32,
-        /// Factor on the reflectance of what is no metal.
+        /// Factor on the specular reflectance of the dielectric part.
         specular: NumberSource,
         /// Factor on that reflectance at normal incidence, ≥ 0.
         specular_color: ColorSource,
-        /// Part of the light below the specular lobe that goes through.
+        /// Fraction of the light below the specular lobe that is transmitted.
         transmission: NumberSource,
         /// Weight of a clear coat.
         clearcoat: NumberSource,
-        /// The root of its α.
+        /// Square root of the coat's GGX α.
         clearcoat_roughness: NumberSource,
     },
 }
 
 impl ColorSource {
-    /// Index of the texture that it is, if it is one.
+    /// Index of the texture, if it is one.
     fn texture(&self) -> Option<usize> {
         match self {
             Self::Constant(_) => None,
@@ -423,7 +423,7 @@ impl ColorSource {
 }
 
 impl MaterialKind {
-    /// Its colours, with their roles.
+    /// The colors with their roles.
     fn colors(&self) -> Vec<(&ColorSource, TextureRole)> {
         match self {
             Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
@@ -452,7 +452,7 @@ impl MaterialKind {
         }
     }
 
-    /// Its numbers that may be textures.
+    /// The numbers that may be textures.
     fn numbers(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
@@ -472,12 +472,12 @@ impl MaterialKind {
 }
 
 impl Material {
-    /// Whether what has it is a light.
+    /// Whether shapes with this material are lights.
     pub fn emits(&self) -> bool {
         self.emission.scale != Vec3::ZERO
     }
 
-    /// Weight and roughness of the clear coat over what it emits. `None` without emission or coat.
+    /// Weight and roughness of the clear coat over the emission. `None` without emission or coat.
     pub fn emission_coat(&self) -> Option<[NumberSource; 2]> {
         match self.kind {
             MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
@@ -493,8 +493,8 @@ impl Material {
         }
     }
 
-    /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with its role; one may
-    /// have several.
+    /// The textures used, as indices into [`Scene::textures`](super::Scene::textures), with their roles. A texture may occur
+    /// several times.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
         let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
@@ -511,7 +511,7 @@ impl Material {
     }
 }
 
-/// Key of the look-up; the texels have keys of their own.
+/// Fingerprint of the lookup. Texels have separate fingerprints.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;

@@ -1,54 +1,53 @@
-//! The table of rendering methods: what each does, and which settings it honours. Nothing else tells integrators apart.
+//! Properties of the integrators, and the settings they support. Other code queries these instead of matching on integrators.
 
 use crate::choice;
 
 choice! {
-    /// Rendering methods.
+    /// Integrators.
     pub enum Integrator {
-        /// Direct light by Phong, mirror, glass, ambient.
+        /// Whitted ray tracing: direct light, mirrors, glass and ambient light.
         Whitted = "whitted",
-        /// All light, by paths from the eye, without bias.
+        /// Unbiased path tracing.
         Path = "path",
     }
 }
 
-/// Properties of a rendering method, and the settings that it honours; it ignores all others of these.
+/// Properties of an integrator, and the settings that it supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Method {
-    /// Whether camera paths are split at glass. Otherwise chance chooses between reflection and refraction.
+    /// Whether camera paths split at glass, instead of choosing randomly between reflection and refraction.
     pub splits: bool,
-    /// Whether paths scatter at rough surfaces, and so find all light by themselves. Otherwise they end there, unless photons are
-    /// gathered.
+    /// Whether paths scatter at rough surfaces, and so find all light. Otherwise they end there, unless photons are gathered.
     pub scatters: bool,
-    /// Whether `[photons]` is honoured.
+    /// Whether `[photons]` is supported.
     pub gathers: bool,
-    /// Whether `shadows` is honoured; otherwise they are soft.
-    pub honours_shadows: bool,
-    /// Whether `ambient` is honoured, if no photons take its place.
-    pub honours_ambient: bool,
-    /// Whether `clamp` is honoured.
-    pub honours_clamp: bool,
+    /// Whether `shadows` is supported. Otherwise shadows are soft.
+    pub honors_shadows: bool,
+    /// Whether `ambient` is supported. Photons replace it.
+    pub honors_ambient: bool,
+    /// Whether `clamp` is supported.
+    pub honors_clamp: bool,
 }
 
 impl Integrator {
-    /// Its line of the table.
+    /// Returns the properties of the integrator.
     pub const fn method(self) -> Method {
         match self {
             Self::Whitted => Method {
                 splits: true,
                 scatters: false,
                 gathers: true,
-                honours_shadows: true,
-                honours_ambient: true,
-                honours_clamp: false,
+                honors_shadows: true,
+                honors_ambient: true,
+                honors_clamp: false,
             },
             Self::Path => Method {
                 splits: false,
                 scatters: true,
                 gathers: false,
-                honours_shadows: false,
-                honours_ambient: false,
-                honours_clamp: true,
+                honors_shadows: false,
+                honors_ambient: false,
+                honors_clamp: true,
             },
         }
     }

@@ -1,7 +1,6 @@
-//! The lowered scene: what a scene file means, with every default filled in and every invariant kept by
-//! validation. Nothing here knows the file's syntax; objects refer to each other by index.
+//! The validated scene, with all defaults filled in. Independent of the file syntax; objects refer to each other by index.
 //!
-//! Lengths are in the scene's unit, angles in degrees, colours linear Rec. 709. All numbers are finite.
+//! Lengths are in the scene's unit, angles in degrees, colors linear Rec. 709. All numbers are finite.
 
 mod camera;
 pub mod light;
@@ -22,41 +21,41 @@ pub use material::{
 };
 pub use method::{Integrator, Method};
 pub use render::{
-    Accel, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
+    Accel, KeyRange, MAX_BOUNCES, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
 };
 pub use shape::{Lowered, Mesh, Object, Placement, Shape, Sheet, greatest};
 
-/// A whole scene.
+/// A scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The `[render]` table.
     pub render: Render,
-    /// Output file, if the scene names one, resolved against the scene's folder.
+    /// The key `output` of `[render]`, resolved against the scene's folder.
     pub output: Option<PathBuf>,
     /// The `[camera]` table.
     pub camera: Camera,
     /// The `[photons]` table.
     pub photons: Photons,
-    /// `[textures.*]`, in the order of the file.
+    /// `[textures.*]`, in file order.
     pub textures: Vec<Texture>,
-    /// `[materials.*]`, in the order of the file.
+    /// `[materials.*]`, in file order.
     pub materials: Vec<Material>,
-    /// The mesh files that `[[mesh]]` tables name, and parts of them, each once.
+    /// The mesh files and parts referenced by `[[mesh]]`, without duplicates.
     pub mesh_files: Vec<MeshFile>,
-    /// Every shape, in the order of the file within its kind.
+    /// All shapes, in file order.
     pub objects: Vec<Object>,
-    /// `[[light]]`, in the order of the file.
+    /// `[[light]]`, in file order.
     pub lights: Vec<Light>,
-    /// `[environment]`; it takes the place of [`Render::background`].
+    /// `[environment]`, which replaces [`Render::background`].
     pub environment: Option<Environment>,
 }
 
-/// A value with its place in the scene file.
+/// A value with its span in the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Located<T> {
     /// The value.
     pub value: T,
-    /// Bytes of the scene file.
+    /// Byte range in the scene file.
     pub span: Range<usize>,
 }
 
@@ -65,21 +64,21 @@ pub struct Located<T> {
 pub struct MeshFile {
     /// The file.
     pub value: PathBuf,
-    /// Bytes of the scene file that name it.
+    /// Byte range of its path in the scene file.
     pub span: Range<usize>,
-    /// Number of the part. `None` for the whole file.
+    /// Index of the part. `None` for the whole file.
     pub part: Option<u32>,
 }
 
-/// Photon maps: read and validated, used by the integrators that have them.
+/// The `[photons]` table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Photons {
-    /// Whether the scene asks for them.
+    /// Whether the scene enables photons.
     pub enabled: bool,
-    /// Photons emitted in a pass; 0 = about one for each pixel.
+    /// Photons per pass. 0 means about one per pixel.
     pub count: u64,
-    /// First gather radius; 0 = chosen from the scene's size.
+    /// Kernel radius of the first pass. 0 chooses it from the photon density.
     pub radius: f64,
-    /// Most bounces.
+    /// Most bounces of a photon.
     pub bounces: u32,
 }

@@ -12,8 +12,8 @@ use crate::math::Vec3;
 use crate::math::limits::LARGEST;
 pub use crate::sampling::filter::PixelFilter;
 
-/// Most scatterings along one path that a scene may ask for: between perfect mirrors a path ends nowhere else.
-pub const MOST_SCATTERINGS: u32 = 10_000;
+/// Largest `max_depth`. Between perfect mirrors, nothing else terminates a path.
+pub const MAX_BOUNCES: u32 = 10_000;
 
 #[doc(hidden)]
 #[macro_export]
@@ -22,41 +22,41 @@ macro_rules! __render_keys {
         $crate::description::render_keys! {
             @pass $callback [$($which)?] []
 
-            /// Width of the image; at most 2^30 pixels in all.
+            /// Width of the image; at most 2^30 pixels in total.
             width: u32 = 640, whole(1, 65_536), "pixels", option;
             /// Height of the image.
             height: u32 = 480, whole(1, 65_536), "pixels", option;
-            /// Most samples that a pixel gets.
+            /// Most samples per pixel.
             samples: u32 = 64, whole(1, u32::MAX), "per pixel", option;
-            /// Noise at which a tile is done; with 0, `samples` decide.
-            error: f32 = 0.0, at_least(0.0), "part of the brightness", option;
-            /// Shadow rays to each light of some size, for each sample.
+            /// Noise at which a tile is finished; 0 always takes all `samples`.
+            error: f32 = 0.0, at_least(0.0), "fraction of the brightness", option;
+            /// Shadow rays per sample to each area light.
             shadow_samples: u32 = 1, whole(1, 4096), "per light", scene;
-            /// Bounces along one path: 0 shows emitted light only, 1 direct light.
-            max_depth: u32 = 8, whole(0, MOST_SCATTERINGS), "scatterings", option;
+            /// Most bounces along a path: 0 shows only emitted light, 1 adds direct light.
+            max_depth: u32 = 8, whole(0, MAX_BOUNCES), "bounces", option;
             /// The rendering algorithm.
             integrator: Integrator = Integrator::Whitted, choice, "", option;
             /// Shadows in `whitted`.
             shadows: Shadows = Shadows::Soft, choice, "", option;
-            /// Most that one bounce may bring: less noise, but the picture gets too dark; 0 is no limit.
+            /// Limits indirect radiance per bounce: removes fireflies, but darkens the image (biased); 0 is no limit.
             clamp: f32 = 0.0, at_least(0.0), "radiance", option;
-            /// Light from everywhere in `whitted`, in place of light that bounces.
+            /// Ambient radiance in `whitted`, an approximation of indirect light.
             ambient: Vec3 = Vec3::ZERO, color, "radiance", scene;
-            /// Radiance that a ray sees when it leaves the scene; it lights nothing.
+            /// Radiance seen by camera rays that leave the scene; it illuminates nothing.
             background: Vec3 = Vec3::ZERO, color, "radiance", scene;
-            /// Reconstruction filter of a pixel.
+            /// Pixel reconstruction filter.
             filter: PixelFilter = PixelFilter::Box, choice, "", scene;
-            /// Brightness of the image: 1 is twice as bright.
+            /// Exposure of the image: 1 is twice as bright.
             exposure: f32 = 0.0, between(-100.0, 100.0), "stops", live;
-            /// Tone curve of formats with 8 or 16 bits, and of the screen.
+            /// Tone curve for 8- and 16-bit formats and the screen.
             tonemap: Tonemap = Tonemap::None, choice, "", scene;
             /// Acceleration structure.
             accel: Accel = Accel::Bvh, choice, "", option;
-            /// Seed of all random numbers: another seed, other noise.
+            /// Random seed: a different seed gives different noise.
             seed: u32 = 0, whole(0, u32::MAX), "", option;
         }
     };
-    // Pass the keys on that are wanted.
+    // Filter the keys.
     (@pass $callback:ident [$($which:ident)?] [$($kept:tt)*]) => { $callback! { $($kept)* } };
     (@pass $callback:ident [] [] $($all:tt)*) => { $callback! { $($all)* } };
     (
@@ -87,35 +87,35 @@ macro_rules! __render_keys {
     };
 }
 
-/// Calls a macro with the keys of `[render]`, each as `doc name: type = default, range, unit, change;`: their one definition. The parser,
-/// [`Render`], the overrides of a run and the options of the command line are made from it or read it.
+/// Passes the definitions of the keys of `[render]` to a macro, each as `doc name: type = default, range, unit, change;`.
+/// The parser, [`Render`], overrides and command-line options are generated from them.
 ///
-/// The ranges are `whole(LEAST, MOST)`, `at_least(LEAST)`, `between(LEAST, MOST)`, `choice` and `color`. The changes:
+/// The ranges are `whole(MIN, MAX)`, `at_least(MIN)`, `between(MIN, MAX)`, `choice` and `color`. The changes:
 ///
 /// | | |
 /// | --- | --- |
-/// | `option` | an option of the command line overrides the key, which has the key's name with `-` for `_` |
-/// | `live` | the terminal UI overrides it |
-/// | `scene` | nothing but the scene sets it |
+/// | `option` | a command-line option overrides the key; its name is the key's, with `-` for `_` |
+/// | `live` | the terminal UI overrides the key |
+/// | `scene` | only the scene sets the key |
 ///
-/// `render_keys!(callback)` passes all of them on, `render_keys!(callback, changed)` those with `option` or `live`,
-/// `render_keys!(callback, option)` those with an option.
+/// `render_keys!(callback)` passes all keys, `render_keys!(callback, changed)` those with `option` or `live`, and
+/// `render_keys!(callback, option)` those with `option`.
 ///
-/// To add a key: a line here; [`Render::add_to`](Fingerprinted::add_to), which says whether pictures depend on it; a line of the
-/// starter scene; and the help of its option, if it has one, in the command line's arguments. Tests compare these.
+/// To add a key, add it here, to [`Render::add_to`](Fingerprinted::add_to) if images depend on it, to the starter scene, and
+/// to the command-line arguments if it has an option. Tests compare these.
 #[doc(inline)]
 pub use __render_keys as render_keys;
 
-/// Values that a key of `[render]` accepts.
+/// Range of a key of `[render]`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum KeyRange {
     /// Whole numbers.
     Whole(RangeInclusive<u32>),
     /// Numbers, up to [`LARGEST`](crate::math::limits::LARGEST).
     Number(RangeInclusive<f64>),
-    /// These names.
+    /// One of these names.
     Names(Vec<&'static str>),
-    /// A colour.
+    /// A color.
     Color,
 }
 
@@ -126,15 +126,15 @@ pub struct RenderKey {
     pub name: &'static str,
     /// Description, one sentence without its full stop.
     pub doc: &'static str,
-    /// The unit; empty for none.
+    /// The unit, or an empty string.
     pub unit: &'static str,
     /// Accepted values.
     pub range: KeyRange,
-    /// The accepted names with their meanings; none for other values.
+    /// Returns the accepted names with their meanings. Empty for other types.
     pub words: WordList,
-    /// The default, as a scene file has it.
+    /// The default, in scene file syntax.
     pub default: String,
-    /// Whether an option of the command line overrides it.
+    /// Whether a command-line option overrides it.
     pub has_option: bool,
 }
 
@@ -181,17 +181,17 @@ macro_rules! settings {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Settings of the picture.
+        /// Settings of `[render]`.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub struct Render {
             $($(#[doc = $doc])* pub $name: $type,)*
         }
 
         impl Render {
-            /// Settings of a scene that has none.
+            /// The default settings.
             pub const DEFAULT: Self = Self { $($name: $default),* };
 
-            /// The keys of `[render]`, but for `output`.
+            /// The keys of `[render]`, except `output`.
             pub fn keys() -> Vec<RenderKey> {
                 vec![$(RenderKey {
                     name: stringify!($name),
@@ -204,7 +204,7 @@ macro_rules! settings {
                 }),*]
             }
 
-            /// The key of a name. `None` if there is none.
+            /// Finds a key by its name.
             pub fn key(name: &str) -> Option<RenderKey> {
                 Self::keys().into_iter().find(|key| key.name == name)
             }
@@ -215,13 +215,13 @@ macro_rules! settings {
 render_keys!(settings);
 
 choice! {
-    /// Methods for shadows.
+    /// Kinds of shadows.
     pub enum Shadows {
-        /// Nothing stops light.
+        /// No shadows.
         Off = "off",
-        /// One ray to the middle of a light.
+        /// One ray to the center of each light.
         Hard = "hard",
-        /// The visible part of the light, sampled.
+        /// Random rays to each area light.
         Soft = "soft",
     }
 }
@@ -231,8 +231,7 @@ choice! {
     pub enum Accel {
         /// Bounding volume hierarchy.
         Bvh = "bvh",
-        /// The same, with large triangles of meshes in several of its leaves: longer to build, faster to trace where
-        /// triangles are long and lie askew.
+        /// BVH with spatial splits (SBVH): slower to build, faster to trace with long, diagonal triangles.
         BvhHigh = "bvh-high",
         /// kd-tree over the triangles of meshes.
         KdTree = "kdtree",
@@ -240,25 +239,25 @@ choice! {
 }
 
 impl Render {
-    /// With the defaults in place of what its integrator ignores.
+    /// Replaces settings that the integrator ignores by their defaults.
     pub fn effective(self) -> Self {
         let method = self.integrator.method();
         Self {
-            shadows: if method.honours_shadows { self.shadows } else { Shadows::Soft },
-            ambient: if method.honours_ambient { self.ambient } else { Vec3::ZERO },
-            clamp: if method.honours_clamp { self.clamp } else { 0.0 },
+            shadows: if method.honors_shadows { self.shadows } else { Shadows::Soft },
+            ambient: if method.honors_ambient { self.ambient } else { Vec3::ZERO },
+            clamp: if method.honors_clamp { self.clamp } else { 0.0 },
             ..self
         }
     }
 }
 
-/// Key of the settings that samples depend on.
+/// Fingerprint of the settings that affect samples.
 impl Fingerprinted for Render {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
         let Self {
             width,
             height,
-            // The film knows how many it has.
+            // The film stores its number of samples.
             samples: _,
             error,
             shadow_samples,
@@ -269,10 +268,10 @@ impl Fingerprinted for Render {
             ambient,
             background,
             filter,
-            // For files and screens only.
+            // These affect only the output.
             exposure: _,
             tonemap: _,
-            // All trees give the same hits; views that show the trees add it.
+            // All structures give the same hits. Views that visualize them add this key.
             accel: _,
             seed,
         } = self.effective();

@@ -23,23 +23,23 @@ pub struct Object {
     pub shape: Shape,
     /// Index into [`Scene::materials`](super::Scene::materials). `None` for the mesh file's own materials.
     pub material: Option<usize>,
-    /// Name in the file.
+    /// The key `name`.
     pub name: Option<Box<str>>,
-    /// The table in the file.
+    /// Byte range of the table header in the file.
     pub span: Range<usize>,
 }
 
 /// The geometry of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// All points at `radius` > 0 from `center`.
+    /// A sphere.
     Sphere {
-        /// Centre.
+        /// Center.
         center: DVec3,
-        /// Radius.
+        /// Radius, > 0.
         radius: f64,
     },
-    /// corner + s·u + t·v, s and t in [0, 1]; u × v ≠ 0, front along it.
+    /// A parallelogram: corner + s·u + t·v with s and t in [0, 1]. The front faces along u × v ≠ 0.
     Quad {
         /// Corner.
         corner: DVec3,
@@ -48,23 +48,23 @@ pub enum Shape {
         /// Second edge.
         v: DVec3,
     },
-    /// Infinite.
+    /// An infinite plane.
     Plane {
-        /// A point of it.
+        /// A point on the plane.
         point: DVec3,
-        /// Its front; not 0, any length.
+        /// Direction that the front faces, of any nonzero length.
         normal: DVec3,
     },
     /// An oriented box.
     Box {
-        /// Centre.
+        /// Center.
         center: DVec3,
         /// Edge lengths, > 0.
         size: DVec3,
-        /// Degrees about x, then y, then z.
+        /// Rotation in degrees about x, then y, then z.
         rotate: DVec3,
     },
-    /// Front along (b − a) × (c − a) ≠ 0.
+    /// A triangle. The front faces along (b − a) × (c − a) ≠ 0.
     Triangle {
         /// Corner.
         a: DVec3,
@@ -73,44 +73,44 @@ pub enum Shape {
         /// Corner.
         c: DVec3,
     },
-    /// Flat and round.
+    /// A disk.
     Disk {
-        /// Centre.
+        /// Center.
         center: DVec3,
-        /// Its front; not 0, any length.
+        /// Direction that the front faces, of any nonzero length.
         normal: DVec3,
-        /// Radius > 0.
+        /// Radius, > 0.
         radius: f64,
     },
-    /// A round bar, or a tube.
+    /// A cylinder.
     Cylinder {
-        /// An end of its axis.
+        /// One end of the axis.
         a: DVec3,
-        /// The other end, elsewhere.
+        /// The other end, different from `a`.
         b: DVec3,
-        /// Radius > 0.
+        /// Radius, > 0.
         radius: f64,
         /// Whether the ends are closed.
         caps: bool,
     },
-    /// Round, with a tip.
+    /// A cone.
     Cone {
-        /// Middle of its base.
+        /// Center of the base.
         base: DVec3,
-        /// Its tip, elsewhere.
+        /// The tip, different from `base`.
         tip: DVec3,
-        /// Radius > 0 of the base.
+        /// Radius of the base, > 0.
         radius: f64,
         /// Whether the base is closed.
         cap: bool,
     },
-    /// A ring of a round tube.
+    /// A torus.
     Torus {
-        /// Centre.
+        /// Center.
         center: DVec3,
-        /// The axis that it goes around; not 0, any length.
+        /// Axis of symmetry, of any nonzero length.
         axis: DVec3,
-        /// Radius of the circle in the middle of the tube, > `tube`.
+        /// Distance from the center to the middle of the tube, > `tube`.
         radius: f64,
         /// Radius of the tube, > 0.
         tube: f64,
@@ -119,36 +119,36 @@ pub enum Shape {
     Mesh(Mesh),
 }
 
-/// A shape with a border: by itself it encloses nothing.
+/// A shape with a border, which does not enclose a volume on its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sheet {
-    /// A parallelogram, by its corners in turn, counterclockwise seen from the front.
+    /// A parallelogram, given by its corners in counterclockwise order seen from the front.
     Quad([DVec3; 4]),
-    /// A triangle, by its corners in turn.
+    /// A triangle, given by its corners in order.
     Triangle([DVec3; 3]),
     /// A disk.
     Disk {
-        /// Centre.
+        /// Center.
         center: DVec3,
         /// Normal of the front, of any length.
         normal: DVec3,
         /// Radius.
         radius: f64,
     },
-    /// The side of a cylinder.
+    /// The lateral surface of a cylinder.
     Cylinder {
-        /// Middle of an end.
+        /// Center of one end.
         a: DVec3,
-        /// Middle of the other end.
+        /// Center of the other end.
         b: DVec3,
         /// Radius.
         radius: f64,
     },
-    /// The side of a cone.
+    /// The lateral surface of a cone.
     Cone {
-        /// Middle of its base.
+        /// Center of the base.
         base: DVec3,
-        /// Its tip.
+        /// The tip.
         tip: DVec3,
         /// Radius of the base.
         radius: f64,
@@ -162,25 +162,25 @@ pub struct Mesh {
     pub file: usize,
     /// Map from the file's coordinates to the scene's.
     pub placed: Placement,
-    /// Interpolate vertex normals.
+    /// Whether vertex normals are interpolated.
     pub smooth: bool,
-    /// Whether the file's vertex colours multiply the material's colour.
+    /// Whether vertex colors multiply the material's color.
     pub vertex_colors: bool,
 }
 
-/// Map from the coordinates of a mesh file to those of the scene.
+/// Transform from the coordinates of a mesh file to the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Placement {
-    /// Three steps.
+    /// Scale, rotation and translation.
     Steps {
-        /// Applied first; no component 0.
+        /// Applied first. No component is 0.
         scale: DVec3,
-        /// Then this, degrees about x, then y, then z.
+        /// Rotation in degrees about x, then y, then z.
         rotate: DVec3,
-        /// Then this.
+        /// Applied last.
         translate: DVec3,
     },
-    /// Any affine map that flattens nothing.
+    /// An invertible affine map.
     Matrix {
         /// Images of the axes.
         linear: [DVec3; 3],
@@ -190,7 +190,7 @@ pub enum Placement {
 }
 
 impl Placement {
-    /// The map.
+    /// Returns the transform.
     pub fn transform(&self) -> Transform {
         match *self {
             Self::Steps { scale, rotate, translate } => {
@@ -203,17 +203,17 @@ impl Placement {
     }
 }
 
-/// Forms that shapes have when they are traced.
+/// Shapes as they are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lowered<'a> {
-    /// One that is computed from its numbers alone.
+    /// An analytic shape.
     Shape(geometry::Shape),
-    /// One whose triangles are in a file.
+    /// A mesh, whose triangles are in a file.
     Mesh(&'a Mesh),
 }
 
 impl Shape {
-    /// Made ready, in coordinates that start at `origin`.
+    /// Lowers the shape, in coordinates relative to `origin`.
     pub fn lowered(&self, origin: DVec3) -> Lowered<'_> {
         let at = |place: DVec3| place - origin;
         Lowered::Shape(match *self {
@@ -240,7 +240,7 @@ impl Shape {
         })
     }
 
-    /// Name of the shape's table in a scene file.
+    /// Name of the shape's table, such as `sphere`.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Sphere { .. } => "sphere",
@@ -261,7 +261,7 @@ impl Shape {
         if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
     }
 
-    /// The sheet that it is. `None` for shapes that have an inside, for planes, and for meshes.
+    /// The shape as a sheet. `None` for shapes with an inside, planes and meshes.
     pub fn sheet(&self) -> Option<Sheet> {
         match *self {
             Self::Quad { corner, u, v } => {
@@ -281,7 +281,7 @@ impl Shape {
         }
     }
 
-    /// A point of it, or inside. `None` for a mesh.
+    /// A point on or inside the shape. `None` for a mesh.
     pub fn point(&self) -> Option<DVec3> {
         match *self {
             Self::Sphere { center, .. }
@@ -296,11 +296,11 @@ impl Shape {
         }
     }
 
-    /// The greatest coordinate along a unit direction, or a little more; infinite for a plane that is not across it. `None` for a
-    /// mesh.
+    /// Upper bound of the projections of all points onto a unit direction. Infinite for planes, unless they are perpendicular
+    /// to it. `None` for a mesh.
     pub fn reach(&self, direction: DVec3) -> Option<f64> {
         let along = |place: DVec3| direction.dot(place);
-        // The part of a circle's radius around an axis that lies along the direction.
+        // Projection onto the direction of a circle's radius around an axis.
         let round = |axis: DVec3, radius: f64| {
             let cosine = axis.try_normalize().map_or(0.0, along);
             radius * (1.0 - cosine * cosine).max(0.0).sqrt()
@@ -331,7 +331,7 @@ impl Shape {
     }
 }
 
-/// The greatest coordinate of points along a unit direction.
+/// The largest projection of points onto a unit direction.
 pub fn greatest(direction: DVec3, points: &[DVec3]) -> f64 {
     points.iter().map(|point| direction.dot(*point)).fold(f64::NEG_INFINITY, f64::max)
 }
@@ -361,7 +361,7 @@ impl Fingerprinted for Shape {
 
 impl Fingerprinted for Mesh {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        // Colours belong to the surfaces, not to the geometry.
+        // Vertex colors do not affect the geometry.
         let Self { file, placed, smooth, vertex_colors: _ } = *self;
         key.key(&of.meshes[file]).flag(smooth);
         match placed {

@@ -3,18 +3,18 @@
 use super::super::description::Camera;
 use super::context::Issue;
 use super::limits::Limits;
-use super::table::Table;
+use super::table::TableReader;
 use crate::math::DVec3;
 
-/// Field of view of a scene that has none.
+/// Default field of view.
 pub(in super::super) const FOV_DEGREES: f64 = 40.0;
 
-/// Below this sine of the angle between them, `up` and the view count as parallel.
-const PARALLEL: f64 = 1e-6;
+/// `up` and the view direction count as parallel if the sine of the angle between them is less than this.
+const MIN_SINE: f64 = 1e-6;
 
-pub(super) fn read(root: &Table<'_>) -> Option<Camera> {
+pub(super) fn read(root: &TableReader<'_>) -> Option<Camera> {
     if !root.optional("camera").is_given() {
-        // The misspelled table is reported; what it is for is then known.
+        // The misspelled table is reported already.
         if root.has_misspelled("camera") {
             return None;
         }
@@ -29,15 +29,15 @@ pub(super) fn read(root: &Table<'_>) -> Option<Camera> {
     camera
 }
 
-fn aperture(table: &Table<'_>) -> f64 {
+fn aperture(table: &TableReader<'_>) -> f64 {
     table.optional("aperture").number(table.limits("aperture")).unwrap_or(0.0)
 }
 
-fn fov(table: &Table<'_>) -> Option<f64> {
+fn fov(table: &TableReader<'_>) -> Option<f64> {
     table.optional("fov").number(table.limits("fov"))
 }
 
-fn look_at(table: &Table<'_>) -> Option<Camera> {
+fn look_at(table: &TableReader<'_>) -> Option<Camera> {
     let position = table.required("position", "[0, 1, 4]");
     let look_at = table.required("look_at", "[0, 1, 0]");
     let (eye, target) = (position.vector(Limits::Any), look_at.vector(Limits::Any));
@@ -56,7 +56,7 @@ fn look_at(table: &Table<'_>) -> Option<Camera> {
         let span = table.optional("look_at").span()?;
         let issue = Issue::error(span, "the camera has no direction")
             .label("the same point as `position`")
-            .help("`look_at` is the point in the middle of the picture");
+            .help("`look_at` is the point at the center of the image");
         table.context.report(issue);
         return None;
     };
@@ -64,8 +64,8 @@ fn look_at(table: &Table<'_>) -> Option<Camera> {
     Some(Camera::LookAt { position, look_at, up, fov, aperture, focus: focus.unwrap_or(view.length()) })
 }
 
-/// `up`, if it is a direction of its own.
-fn upright(table: &Table<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
+/// Returns `up` if it is long enough and not parallel to `view`.
+fn upright(table: &TableReader<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
     let span = table.optional("up").span().or(table.optional("look_at").span())?;
     if !table.optional("up").is_long(up) {
         return None;
@@ -75,26 +75,26 @@ fn upright(table: &Table<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
         table.context.report(issue.help("the default is [0, 1, 0]"));
         return None;
     };
-    if view.cross(direction).length() < PARALLEL {
+    if view.cross(direction).length() < MIN_SINE {
         let given = table.optional("up").is_given();
         let label =
             if given { "parallel to the view" } else { "the view is parallel to the default [0, 1, 0]" };
         let issue = Issue::error(span, "`up` must not be parallel to the view")
             .label(label)
-            .help("for a view straight up or down, `up = [0, 0, -1]` will do");
+            .help("for a view straight up or down, use `up = [0, 0, -1]`");
         table.context.report(issue);
         return None;
     }
     Some(up)
 }
 
-fn orbiter(table: &Table<'_>) -> Option<Camera> {
+fn orbiter(table: &TableReader<'_>) -> Option<Camera> {
     let file = table.optional("orbiter").file(&[]);
     let (fov, aperture) = (fov(table), aperture(table));
     let focus = table.optional("focus").number(table.limits("focus"));
     for name in ["position", "look_at", "up"] {
-        let message = format!("`{name}` and `orbiter` exclude each other");
-        let help = "the orbiter file says where the camera is: remove one of the two";
+        let message = format!("`{name}` conflicts with `orbiter`");
+        let help = "the orbiter file already sets the camera position: remove one of the two";
         table.unavailable(name, &message, Some(help));
     }
     Some(Camera::Orbiter { file: file?, fov, aperture, focus })

@@ -1,12 +1,12 @@
-//! The keys that all materials have.
+//! Keys common to all materials.
 
 use super::super::description::{Bump, EmissionSource, NormalMap, NumberSource, OpacitySource};
 use super::context::Issue;
 use super::names::Names;
-use super::table::Table;
+use super::table::TableReader;
 
 /// `emission` and `emission_sides`.
-pub(super) fn emission(table: &Table<'_>, textures: &Names) -> EmissionSource {
+pub(super) fn emission(table: &TableReader<'_>, textures: &Names) -> EmissionSource {
     let source = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
     let sides = table.optional("emission_sides").choice().unwrap_or(source.sides);
     warn_without(table, "emission_sides", "emission");
@@ -14,7 +14,7 @@ pub(super) fn emission(table: &Table<'_>, textures: &Names) -> EmissionSource {
 }
 
 /// `normal_map` and `normal_strength`.
-pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
+pub(super) fn normal_map(table: &TableReader<'_>, textures: &Names) -> Option<NormalMap> {
     let texture = table.optional("normal_map").name_in(textures);
     let strength = table.optional("normal_strength").number32(table.limits("normal_strength")).unwrap_or(1.0);
     warn_without(table, "normal_strength", "normal_map");
@@ -22,7 +22,7 @@ pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMa
 }
 
 /// `bump` and `bump_scale`.
-pub(super) fn bump(table: &Table<'_>, textures: &Names) -> Option<Bump> {
+pub(super) fn bump(table: &TableReader<'_>, textures: &Names) -> Option<Bump> {
     let texture = table.optional("bump").texture_of_numbers(textures);
     let scale = table.optional("bump_scale").number32(table.limits("bump_scale")).unwrap_or(0.01);
     warn_without(table, "bump_scale", "bump");
@@ -30,25 +30,25 @@ pub(super) fn bump(table: &Table<'_>, textures: &Names) -> Option<Bump> {
 }
 
 /// `opacity` and `opacity_cutoff`.
-pub(super) fn opacity(table: &Table<'_>, textures: &Names) -> OpacitySource {
+pub(super) fn opacity(table: &TableReader<'_>, textures: &Names) -> OpacitySource {
     let value = table.optional("opacity").number_or_texture(textures, table.limits("opacity"));
     let cutoff = table.optional("opacity_cutoff").number32(table.limits("opacity_cutoff")).unwrap_or(0.0);
     warn_without(table, "opacity_cutoff", "opacity");
     OpacitySource { value: value.unwrap_or(NumberSource::Constant(1.0)), cutoff }
 }
 
-/// Warns of a key that changes nothing without another one.
-pub(super) fn warn_without(table: &Table<'_>, name: &'static str, other: &'static str) {
+/// Warns about a key that has no effect without another one.
+pub(super) fn warn_without(table: &TableReader<'_>, name: &'static str, other: &'static str) {
     let key = table.optional(name);
     if let Some(span) = key.key_span().filter(|_| !table.optional(other).is_given()) {
-        key.context.report(Issue::warning(span, format!("`{name}` does nothing without `{other}`")));
+        key.context.report(Issue::warning(span, format!("`{name}` has no effect without `{other}`")));
     }
 }
 
-/// Reports these keys in a material that fills its shape.
-pub(super) fn refuse_opacity(table: &Table<'_>) {
+/// Reports opacity keys of solid glass.
+pub(super) fn refuse_opacity(table: &TableReader<'_>) {
     for name in ["opacity", "opacity_cutoff"] {
-        let message = format!("`{name}` is for surfaces, and this glass fills its shape");
-        table.unavailable(name, &message, Some("`thin = true` makes a pane of it"));
+        let message = format!("solid glass cannot have `{name}`");
+        table.unavailable(name, &message, Some("use `thin = true` for a pane"));
     }
 }

@@ -1,4 +1,4 @@
-//! Context of all readers of one file: its text, its place, and the list of its mistakes.
+//! Context shared by all readers of one file: its text, its path and the issues found.
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::ops::Range;
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 
 use super::super::diagnostic::{Diagnostic, Severity};
 use super::super::report::LineIndex;
-use super::super::source::Source;
+use super::super::source::SceneText;
 
 /// A file that is being read.
 pub(super) struct Context<'a> {
-    source: Source,
+    source: SceneText,
     path: &'a Path,
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
@@ -19,36 +19,36 @@ pub(super) struct Context<'a> {
     searches: Cell<Searches>,
 }
 
-/// Number of searches for a name among many, and of comparisons.
+/// Number of searches for similar names, and of comparisons.
 #[derive(Clone, Copy, Default)]
 struct Searches {
     count: usize,
     comparisons: usize,
 }
 
-/// A diagnostic before it has its file.
+/// A diagnostic without its file.
 pub(super) struct Issue {
     severity: Severity,
     span: Range<usize>,
     message: String,
     label: String,
     help: Option<String>,
-    cause: Cause,
+    cause: IssueCause,
 }
 
-/// Cause of an issue: it decides whether the issue is worth showing beside errors of syntax.
+/// Cause of an issue, which determines whether it is shown if there are syntax errors.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Cause {
-    /// The TOML is broken.
+enum IssueCause {
+    /// A TOML syntax error.
     Syntax,
-    /// The value at the place.
+    /// The value at the span.
     Value,
-    /// A value elsewhere, or one that is missing: perhaps it stands in a broken line.
+    /// A missing value, or one elsewhere: perhaps it is in a line with a syntax error.
     Absence,
 }
 
 impl Issue {
-    /// The scene cannot be rendered because of what is at `span`.
+    /// An error at `span`.
     pub(super) fn error(span: Range<usize>, message: impl Into<String>) -> Self {
         let message = message.into();
         Self {
@@ -57,59 +57,59 @@ impl Issue {
             message,
             label: String::new(),
             help: None,
-            cause: Cause::Value,
+            cause: IssueCause::Value,
         }
     }
 
     /// A likely mistake at `span`.
     pub(super) fn warning(span: Range<usize>, message: impl Into<String>) -> Self {
-        Self { severity: Severity::Warning, cause: Cause::Absence, ..Self::error(span, message) }
+        Self { severity: Severity::Warning, cause: IssueCause::Absence, ..Self::error(span, message) }
     }
 
-    /// A few words under the underline.
+    /// Sets the label of the underline.
     pub(super) fn label(self, label: impl Into<String>) -> Self {
         Self { label: label.into(), ..self }
     }
 
-    /// The way out.
+    /// Sets the help text.
     pub(super) fn help(self, help: impl Into<String>) -> Self {
         Self { help: Some(help.into()), ..self }
     }
 
-    /// The way out, if there is one to offer.
+    /// Sets the help text, if there is one.
     pub(super) fn maybe_help(self, help: Option<String>) -> Self {
         Self { help, ..self }
     }
 
-    /// This is about something that is not there.
+    /// Marks the issue as caused by a missing value.
     pub(super) fn absence(self) -> Self {
-        Self { cause: Cause::Absence, ..self }
+        Self { cause: IssueCause::Absence, ..self }
     }
 
-    /// This is about the TOML itself.
+    /// Marks the issue as a syntax error.
     pub(super) fn syntax(self) -> Self {
-        Self { cause: Cause::Syntax, ..self }
+        Self { cause: IssueCause::Syntax, ..self }
     }
 }
 
 impl<'a> Context<'a> {
-    pub(super) fn new(source: Source, path: &'a Path) -> Self {
+    pub(super) fn new(source: SceneText, path: &'a Path) -> Self {
         let (lines, issues, counts, searches) = Default::default();
         Self { source, path, lines, issues, counts, searches }
     }
 
-    /// Adds to the list.
+    /// Adds an issue to the list.
     pub(super) fn report(&self, issue: Issue) {
         self.report_with(|| issue);
     }
 
-    /// Adds an issue to the list; if the list has enough errors, or enough warnings, only counts it.
+    /// Adds an issue to the list. Only counts it if the list is full.
     pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
         let issue = make();
         let mut counts = self.counts.get();
         let count = &mut counts[usize::from(issue.severity == Severity::Warning)];
         *count += 1;
-        if *count <= MOST_COLLECTED {
+        if *count <= MAX_COLLECTED {
             self.issues.borrow_mut().push(issue);
         }
         self.counts.set(counts);
@@ -124,16 +124,16 @@ impl<'a> Context<'a> {
         self.source.text()
     }
 
-    /// The text at a place; empty where the place is not in the text.
+    /// The text at `span`, or an empty string if it is out of range.
     pub(super) fn text(&self, span: &Range<usize>) -> &str {
         self.source.all().get(span.clone()).unwrap_or_default()
     }
 
-    /// Looks for a name in what may be a long list. Each search costs as much as the list is long, so that only the
-    /// first few dozen of a file are made: a file with more wrong names has one mistake many times.
+    /// Searches for a similar name in a list. The cost is linear in the list, so the number of searches per file is limited: a
+    /// file with more wrong names has the same mistake many times.
     pub(super) fn search<T>(&self, comparisons: usize, look: impl FnOnce() -> Option<T>) -> Option<T> {
         let Searches { count, comparisons: before } = self.searches.get();
-        if count >= MOST_SEARCHES || before >= MOST_COMPARISONS {
+        if count >= MAX_SEARCHES || before >= MAX_COMPARISONS {
             return None;
         }
         self.searches.set(Searches { count: count + 1, comparisons: before + comparisons });
@@ -146,12 +146,12 @@ impl<'a> Context<'a> {
         self.searches.get().comparisons
     }
 
-    /// The line of a byte of the text, from 1.
+    /// The line number of a byte offset, from 1.
     pub(super) fn line(&self, offset: usize) -> usize {
         self.lines().line(offset)
     }
 
-    /// The text of a line, counted from 1.
+    /// The text of a line, given its number from 1.
     pub(super) fn line_text(&self, line: usize) -> Option<&str> {
         let text = self.source.all();
         text.get(self.lines().span(line.checked_sub(1)?, text)?)
@@ -161,40 +161,40 @@ impl<'a> Context<'a> {
         self.lines.get_or_init(|| LineIndex::new(self.source.all()))
     }
 
-    /// A path in the scene, seen from the scene's folder.
+    /// Resolves a path relative to the scene's folder.
     pub(super) fn resolve(&self, file: &str) -> PathBuf {
         self.path.parent().unwrap_or(Path::new("")).join(file)
     }
 
-    /// All issues, in the order of the file. If the TOML is broken, leaves out issues that may only follow from that: those in
-    /// the lines named, and missing values.
+    /// Returns all issues in file order. If there are syntax errors, omits issues that may be their consequences: those in
+    /// `broken_lines`, and missing values.
     pub(super) fn finish(self, broken_lines: &[Range<usize>]) -> Vec<Diagnostic> {
         let mut issues = self.issues.take();
         if !broken_lines.is_empty() {
             issues.retain(|issue| match issue.cause {
-                Cause::Syntax => true,
-                Cause::Absence => false,
-                // What stands for a value that broken TOML hides is at no place.
-                Cause::Value if issue.span == (0..0) => false,
-                Cause::Value => {
+                IssueCause::Syntax => true,
+                IssueCause::Absence => false,
+                // The placeholder for a value lost to a syntax error has no span.
+                IssueCause::Value if issue.span == (0..0) => false,
+                IssueCause::Value => {
                     let line = self.line(issue.span.start);
                     let before = broken_lines.partition_point(|lines| lines.start <= line);
                     !before.checked_sub(1).is_some_and(|last| broken_lines[last].contains(&line))
                 }
             });
         }
-        // Warnings never hide an error: what is left out of a long list are the last warnings, then the last errors.
+        // Never let warnings displace errors: drop the last warnings first, then the last errors.
         let place = |issue: &Issue| (issue.span.start, issue.severity == Severity::Warning);
         issues.sort_by_key(|issue| (issue.severity == Severity::Warning, issue.span.start));
         let collected = |severity| issues.iter().filter(|issue| issue.severity == severity).count();
         let [errors, warnings] = [Severity::Error, Severity::Warning].map(collected);
-        let uncollected = self.counts.get().map(|count| count.saturating_sub(MOST_COLLECTED));
-        let unshown_errors = errors.saturating_sub(MOST_ISSUES) + uncollected[0];
-        let unshown = (errors + warnings).saturating_sub(MOST_ISSUES) + uncollected[0] + uncollected[1];
-        issues.truncate(MOST_ISSUES);
+        let uncollected = self.counts.get().map(|count| count.saturating_sub(MAX_COLLECTED));
+        let unshown_errors = errors.saturating_sub(MAX_ISSUES) + uncollected[0];
+        let unshown = (errors + warnings).saturating_sub(MAX_ISSUES) + uncollected[0] + uncollected[1];
+        issues.truncate(MAX_ISSUES);
         issues.sort_by_key(place);
         if unshown > 0 {
-            let message = format!("and {unshown} more like these");
+            let message = format!("and {unshown} {MORE_LIKE_THESE}");
             let end = self.source.text().len();
             let make = if unshown_errors > 0 { Issue::error } else { Issue::warning };
             issues.push(make(end..end, message));
@@ -204,20 +204,24 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Nobody reads on from here.
-const MOST_ISSUES: usize = 500;
+/// End of the message that counts the issues that are not listed.
+pub(crate) const MORE_LIKE_THESE: &str = "more like these";
 
-/// Searches for the nearest of many names that are made for one file.
-const MOST_SEARCHES: usize = 48;
+/// Most issues listed.
+const MAX_ISSUES: usize = 500;
 
-/// No search begins after this many names were compared.
-const MOST_COMPARISONS: usize = 200_000;
+/// Most searches for similar names per file.
+const MAX_SEARCHES: usize = 48;
 
-/// Enough errors, and enough warnings, to find the first of them in the order of the file, in all files but monstrous ones.
-const MOST_COLLECTED: usize = 10_000;
+/// Most name comparisons per file, checked before each search.
+const MAX_COMPARISONS: usize = 200_000;
+
+/// Most errors, and most warnings, that are collected: enough that the first ones in file order are found, except in absurdly
+/// broken files.
+const MAX_COLLECTED: usize = 10_000;
 
 impl Issue {
-    fn into_diagnostic(self, path: &Path, source: &Source) -> Diagnostic {
+    fn into_diagnostic(self, path: &Path, source: &SceneText) -> Diagnostic {
         let label = if self.label.is_empty() { String::new() } else { format!("; {}", self.label) };
         let (path, place) = source.place(path, self.span, self.label);
         let (severity, mut message, help) = (self.severity, self.message, self.help);

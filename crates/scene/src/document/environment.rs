@@ -3,11 +3,11 @@
 use super::super::description::{Environment, Scene};
 use super::super::keys::endings::MAPS;
 use super::context::Issue;
-use super::table::Table;
+use super::table::TableReader;
 use crate::math::Vec3;
 
-/// The environment. `None` if it is invalid, `Some(None)` if it is absent.
-pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
+/// Reads the environment. `None` if it is invalid, `Some(None)` if it is absent.
+pub(super) fn read(root: &TableReader<'_>) -> Option<Option<Environment>> {
     let key = root.optional("environment");
     let Some(table) = root.table("environment") else {
         return (!key.is_given()).then_some(None);
@@ -21,21 +21,21 @@ pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
     table.finish();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_given())) {
         let issue =
-            Issue::warning(span, "`color` is black, and so is the environment").label("a factor of `file`");
-        table.context.report(issue.help("leave it out to see the map as it is"));
+            Issue::warning(span, "`color` is black, so the environment is black").label("a factor on `file`");
+        table.context.report(issue.help("remove it to use the map unchanged"));
     }
     if let Some(span) = rotate.span().filter(|_| !file.is_given()) {
-        let issue = Issue::warning(span, "`rotate` does nothing without a `file`");
-        table.context.report(issue.help("the environment is the same in every direction"));
+        let issue = Issue::warning(span, "`rotate` has no effect without `file`");
+        table.context.report(issue.help("a constant environment looks the same from every direction"));
     }
     Some(Some(Environment { color: radiance?, file: map?, rotate: degrees? }))
 }
 
-/// Warns about a background that is not seen.
-pub(super) fn warn_about_background(root: &Table<'_>, scene: &Scene) {
+/// Warns about a background that is hidden by the environment.
+pub(super) fn warn_about_background(root: &TableReader<'_>, scene: &Scene) {
     let Some(span) = root.optional("environment").key_span() else { return };
     if scene.environment.is_some() && scene.render.background != Vec3::ZERO {
-        let issue = Issue::warning(span, "[environment] takes the place of `background`, which is not seen");
-        root.context.report(issue.help("leave out one of them; an environment also gives light"));
+        let issue = Issue::warning(span, "[environment] replaces `background`, which has no effect");
+        root.context.report(issue.help("remove one of them; only an environment lights the scene"));
     }
 }

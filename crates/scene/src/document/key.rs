@@ -1,5 +1,5 @@
-//! One key of a table, read as the expected type. Each reader returns `None` if the key is absent, and reports an error and
-//! returns `None` if it is invalid.
+//! Reads one key of a table as the expected type. Every reader returns `None` if the key is absent. If it is invalid, it also
+//! reports an error.
 
 mod color;
 mod file;
@@ -12,21 +12,21 @@ use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 use super::limits::Limits;
 use super::names::Names;
-use super::table::{Table, Title};
-use super::value::{Item, Value, found, limited, whole, wrong_type};
+use super::table::{TableReader, Title};
+use super::value::{TomlValue, Value, found, limited, whole, wrong_type};
 use crate::choice::Choice;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 use crate::math::{DVec3, Vec2};
 
-/// A key that a reader asked for.
-pub(super) struct Key<'a> {
+/// A key of a table, present or absent.
+pub(super) struct TableKey<'a> {
     pub(super) context: &'a Context<'a>,
     pub(super) name: &'static str,
     pub(super) value: Option<Value<'a>>,
     key_span: Option<Range<usize>>,
 }
 
-impl<'a> Key<'a> {
+impl<'a> TableKey<'a> {
     pub(super) fn new(
         context: &'a Context<'a>,
         name: &'static str,
@@ -36,22 +36,22 @@ impl<'a> Key<'a> {
         Self { context, name, value, key_span }
     }
 
-    /// Whether the file has it.
+    /// Whether the file has the key.
     pub(super) fn is_given(&self) -> bool {
         self.value.is_some()
     }
 
-    /// The place of the key itself.
+    /// The span of the key.
     pub(super) fn key_span(&self) -> Option<Range<usize>> {
         self.key_span.clone()
     }
 
-    /// The place of its value.
+    /// The span of its value.
     pub(super) fn span(&self) -> Option<Range<usize>> {
         self.value.map(|value| value.span())
     }
 
-    /// A number; integers will do.
+    /// A number. Integers are accepted.
     pub(super) fn number(&self, limits: Limits) -> Option<f64> {
         limited(self.context, self.name, self.value?, limits, "a number")
     }
@@ -61,10 +61,10 @@ impl<'a> Key<'a> {
         self.number(limits).map(|number| number as f32)
     }
 
-    /// A whole number. `N` holds every number of the range.
+    /// An integer. `N` must be able to represent the whole range.
     pub(super) fn whole<N: TryFrom<i128>>(&self, range: RangeInclusive<i128>) -> Option<N> {
         let value = self.value?;
-        let Item::Integer { digits, radix } = value.item() else {
+        let TomlValue::Integer { digits, radix } = value.item() else {
             wrong_type(self.context, self.name, value, "a whole number");
             return None;
         };
@@ -81,29 +81,29 @@ impl<'a> Key<'a> {
     /// `true` or `false`.
     pub(super) fn flag(&self) -> Option<bool> {
         let value = self.value?;
-        if let Item::Boolean(flag) = value.item() {
+        if let TomlValue::Boolean(flag) = value.item() {
             return Some(flag);
         }
         wrong_type(self.context, self.name, value, "true or false");
         None
     }
 
-    /// A string; `expected` says of what.
+    /// A string. `expected` describes it in errors.
     pub(super) fn text(&self, expected: &str) -> Option<&'a str> {
         self.text_or(|| expected.to_owned())
     }
 
-    /// A string, or an error that says what is expected.
+    /// A string, described by `expected` in errors.
     fn text_or(&self, expected: impl FnOnce() -> String) -> Option<&'a str> {
         let value = self.value?;
-        if let Item::String(text) = value.item() {
+        if let TomlValue::String(text) = value.item() {
             return Some(text);
         }
         wrong_type(self.context, self.name, value, &expected());
         None
     }
 
-    /// Name of a shape, if it has one; a name that could be a number is an error.
+    /// The name of a shape, if it has one. Names that look like numbers are errors.
     pub(super) fn shape_name(&self) -> Option<Option<Box<str>>> {
         if !self.is_given() {
             return Some(None);
@@ -112,19 +112,18 @@ impl<'a> Key<'a> {
         if text.bytes().any(|byte| !byte.is_ascii_digit()) {
             return Some(Some(text.into()));
         }
-        let issue = Issue::error(self.span()?, format!("`{}` must be more than a number", self.name));
-        self.context.report(
-            issue.help("shapes are also known by their numbers, from 1, so that a name has a letter"),
-        );
+        let issue = Issue::error(self.span()?, format!("`{}` must not be a number", self.name));
+        self.context
+            .report(issue.help("use a name with a letter, as shapes can also be referred to by number"));
         None
     }
 
     /// Whether its value is a table.
     pub(super) fn is_table(&self) -> bool {
-        self.value.is_some_and(|value| matches!(value.item(), Item::Table(_)))
+        self.value.is_some_and(|value| matches!(value.item(), TomlValue::Table(_)))
     }
 
-    /// A value by its name.
+    /// A choice, given by its name.
     pub(super) fn choice<C: Choice>(&self) -> Option<C> {
         let list = || {
             let list = C::ALL.iter().map(|one| format!("\"{}\"", one.name())).collect::<Vec<_>>().join(", ");
@@ -154,13 +153,13 @@ impl<'a> Key<'a> {
         self.numbers(limits, "three numbers, [x, y, z]").map(DVec3::from_array)
     }
 
-    /// Three numbers; `default` where the key is absent.
+    /// Three numbers, or `default` if the key is absent.
     pub(super) fn vector_or(&self, limits: Limits, default: DVec3) -> Option<DVec3> {
         if self.is_given() { self.vector(limits) } else { Some(default) }
     }
 
-    /// Whether a vector that the key gave is long enough to work with; an error if not. One of length 0 is left to the
-    /// caller, who knows what it is for.
+    /// Checks that a vector is long enough to work with, and reports an error if not. Does not report vectors of length 0,
+    /// for which the caller has a better message.
     pub(super) fn is_long(&self, vector: DVec3) -> bool {
         let length = length(vector);
         let Some(span) = self.span().filter(|_| is_too_short(length)) else { return true };
@@ -169,8 +168,8 @@ impl<'a> Key<'a> {
         false
     }
 
-    /// Whether two points are far enough from each other to work with; an error if not. Points at one place are left
-    /// to the caller. `self` and `other` are their keys.
+    /// Checks that two points, given by `self` and `other`, are far enough apart to work with, and reports an error if not.
+    /// Does not report equal points, for which the caller has a better message.
     pub(super) fn is_apart(&self, from: DVec3, other: &Self, to: DVec3) -> bool {
         let distance = length(to - from);
         let span = other.span().or(self.span());
@@ -186,7 +185,7 @@ impl<'a> Key<'a> {
         self.numbers(limits, "two numbers, [u, v]").map(|[u, v]: [f64; 2]| Vec2::new(u as f32, v as f32))
     }
 
-    /// Numbers of an array of that length; reports every wrong one.
+    /// An array of `N` numbers. Reports every invalid one.
     pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {
@@ -201,20 +200,20 @@ impl<'a> Key<'a> {
         is_whole.then(|| numbers.map(Option::unwrap_or_default))
     }
 
-    /// A number for all three axes, or three.
+    /// One number for all three axes, or three numbers.
     pub(super) fn scale(&self, limits: Limits) -> Option<DVec3> {
-        if matches!(self.value?.item(), Item::Integer { .. } | Item::Float(_)) {
+        if matches!(self.value?.item(), TomlValue::Integer { .. } | TomlValue::Float(_)) {
             return self.number(limits).map(DVec3::splat);
         }
         self.numbers(limits, "a number or three, [x, y, z]").map(DVec3::from_array)
     }
 
-    /// The index of a thing that is named elsewhere in the file.
+    /// Reads a name and returns its index in `names`.
     pub(super) fn name_in(&self, names: &Names) -> Option<usize> {
         self.find(names, self.text_or(|| format!("the name of a {}", names.kind))?)
     }
 
-    /// The index of a thing of this name, which is the value.
+    /// Looks up the name `text`, which is the value of this key.
     fn find(&self, names: &Names, text: &str) -> Option<usize> {
         let index = names.find(text);
         if index.is_none() {
@@ -225,8 +224,8 @@ impl<'a> Key<'a> {
         index
     }
 
-    /// The value as a table of its own, `{ … }`.
-    pub(super) fn inline_table(&self) -> Option<Table<'a>> {
-        Table::of(self.context, self.value?, Title::Key(self.name))
+    /// The value as an inline table, `{ … }`.
+    pub(super) fn inline_table(&self) -> Option<TableReader<'a>> {
+        TableReader::of(self.context, self.value?, Title::Key(self.name))
     }
 }

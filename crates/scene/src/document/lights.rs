@@ -5,48 +5,48 @@ use super::super::description::light::{DirectionalLight, Falloff, PointLight, Sp
 use super::context::Issue;
 use super::limits::Limits;
 use super::shapes::direction;
-use super::table::Table;
+use super::table::TableReader;
 use crate::choice;
 use crate::math::{DVec3, Vec3};
 
 choice! {
     /// Types of lights.
-    enum Kind {
-        /// Without extent.
+    enum LightKind {
+        /// A point light.
         Point = "point",
-        /// Without extent, into a cone.
+        /// A point light that shines into a cone.
         Spot = "spot",
-        /// From far away.
+        /// A distant light.
         Directional = "directional",
     }
 }
 
-pub(super) fn read(root: &Table<'_>) -> Option<Vec<Light>> {
+pub(super) fn read(root: &TableReader<'_>) -> Option<Vec<Light>> {
     let read: Vec<Option<Light>> = root.tables("light").map(|table| light(&table)).collect();
     read.into_iter().collect()
 }
 
-fn light(table: &Table<'_>) -> Option<Light> {
+fn light(table: &TableReader<'_>) -> Option<Light> {
     let key = table.optional("type");
-    // Without knowing the type, no key can be called unknown.
-    let kind = if key.is_given() { key.choice()? } else { Kind::Point };
+    // If the type is invalid, no key can be reported as unknown.
+    let kind = if key.is_given() { key.choice()? } else { LightKind::Point };
     let light = match kind {
-        Kind::Point => point(table).map(Light::Point),
-        Kind::Spot => spot(table).map(Light::Spot),
-        Kind::Directional => directional(table).map(Light::Directional),
+        LightKind::Point => point(table).map(Light::Point),
+        LightKind::Spot => spot(table).map(Light::Spot),
+        LightKind::Directional => directional(table).map(Light::Directional),
     };
     table.finish();
     light
 }
 
-fn point(table: &Table<'_>) -> Option<PointLight> {
+fn point(table: &TableReader<'_>) -> Option<PointLight> {
     let position = table.optional("position").vector_or(Limits::Any, DVec3::new(0.0, 3.0, 0.0));
     let intensity = table.optional("intensity").color().unwrap_or(Vec3::splat(10.0));
     let falloff = table.optional("falloff").choice().unwrap_or(Falloff::Square);
     Some(PointLight { position: position?, intensity, falloff })
 }
 
-fn spot(table: &Table<'_>) -> Option<SpotLight> {
+fn spot(table: &TableReader<'_>) -> Option<SpotLight> {
     let point = point(table);
     let aim = table.optional("look_at");
     let look_at = aim.vector_or(Limits::Any, DVec3::ZERO);
@@ -59,7 +59,7 @@ fn spot(table: &Table<'_>) -> Option<SpotLight> {
     if point.position == look_at {
         let issue = Issue::error(aim.span().or(place.span())?, "the spotlight has no direction")
             .label("`position` and `look_at` are the same point")
-            .help("without them, `position` is [0, 3, 0] and `look_at` [0, 0, 0]");
+            .help("the defaults are `position = [0, 3, 0]` and `look_at = [0, 0, 0]`");
         table.context.report(issue);
         return None;
     }
@@ -69,17 +69,18 @@ fn spot(table: &Table<'_>) -> Option<SpotLight> {
     Some(SpotLight { point, look_at, angle: angle?, blend: blend? })
 }
 
-/// The least apparent diameter of a disc, in degrees: directions in single precision cannot tell a smaller one from none.
-const NARROWEST: f64 = 1e-3;
+/// Smallest apparent diameter in degrees. Directions in single precision cannot distinguish smaller ones from 0.
+const MIN_ANGLE_DEGREES: f64 = 1e-3;
 
-fn directional(table: &Table<'_>) -> Option<DirectionalLight> {
+fn directional(table: &TableReader<'_>) -> Option<DirectionalLight> {
     let direction = direction(table, "direction", "light", DVec3::NEG_Y);
     let irradiance = table.optional("irradiance").color().unwrap_or(Vec3::ONE);
     let key = table.optional("angle");
     let angle = if key.is_given() { key.number(table.limits("directional.angle")) } else { Some(0.0) };
-    if angle.is_some_and(|angle| angle != 0.0 && angle < NARROWEST) {
-        let issue = Issue::error(key.span()?, format!("`angle` must be 0, or at least {NARROWEST:e}"));
-        table.context.report(issue.help("0 is a light without extent; the sun has 0.53"));
+    if angle.is_some_and(|angle| angle != 0.0 && angle < MIN_ANGLE_DEGREES) {
+        let issue =
+            Issue::error(key.span()?, format!("`angle` must be 0, or at least {MIN_ANGLE_DEGREES:e}"));
+        table.context.report(issue.help("0 means no extent; the sun has 0.53"));
         return None;
     }
     Some(DirectionalLight { direction: direction?, irradiance, angle: angle? })

@@ -5,43 +5,43 @@ use super::super::description::{
 };
 use super::common;
 use super::context::Issue;
-use super::key::Key;
+use super::key::TableKey;
 use super::names::Names;
-use super::table::Table;
+use super::table::TableReader;
 use crate::choice;
 use crate::materials::metal::elements::Element;
 use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
-pub(super) struct Materials {
+pub(super) struct MaterialList {
     /// Names of the materials.
     pub(super) names: Names,
-    /// In the order of the names; none if one of them is wrong.
+    /// The materials in the order of the names. `None` if one is invalid.
     pub(super) list: Option<Vec<Material>>,
     /// Whether each material emits light.
     emissive: Vec<bool>,
 }
 
-impl Materials {
+impl MaterialList {
     /// Whether a material emits light.
     pub(super) fn is_emissive(&self, index: usize) -> bool {
         self.emissive.get(index).copied().unwrap_or(false)
     }
 }
 
-pub(super) fn read(root: &Table<'_>, textures: &Names) -> Materials {
+pub(super) fn read(root: &TableReader<'_>, textures: &Names) -> MaterialList {
     let tables = root.named_tables("materials");
     let names = Names::new("material", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Material>> =
         tables.into_iter().map(|(name, _, table)| material(name, &table?, textures)).collect();
     let emits = |material: &Material| material.emits();
     let emissive = read.iter().map(|material| material.as_ref().is_some_and(emits)).collect();
-    Materials { names, list: read.into_iter().collect(), emissive }
+    MaterialList { names, list: read.into_iter().collect(), emissive }
 }
 
 choice! {
     /// Types of materials.
-    enum Kind {
+    enum MaterialType {
         /// Diffuse and glossy.
         Phong = "phong",
         /// A perfect mirror.
@@ -57,17 +57,17 @@ choice! {
     }
 }
 
-fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Material> {
+fn material(name: String, table: &TableReader<'_>, textures: &Names) -> Option<Material> {
     let key = table.optional("type");
-    // Without knowing the type, no key can be called unknown.
-    let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
+    // If the type is invalid, no key can be reported as unknown.
+    let kind = if key.is_given() { key.choice()? } else { MaterialType::Phong };
     let kind = match kind {
-        Kind::Phong => Some(phong(table, textures)),
-        Kind::Mirror => Some(mirror(table, textures)),
-        Kind::Glass => glass(table, textures),
-        Kind::Metal => metal(table, textures),
-        Kind::Plastic => Some(plastic(table, textures)),
-        Kind::Principled => Some(principled(table, textures)),
+        MaterialType::Phong => Some(phong(table, textures)),
+        MaterialType::Mirror => Some(mirror(table, textures)),
+        MaterialType::Glass => glass(table, textures),
+        MaterialType::Metal => metal(table, textures),
+        MaterialType::Plastic => Some(plastic(table, textures)),
+        MaterialType::Principled => Some(principled(table, textures)),
     };
     let (emission, normal_map) = (common::emission(table, textures), common::normal_map(table, textures));
     let bump = common::bump(table, textures);
@@ -81,18 +81,18 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
-fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
+fn phong(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
     let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
     let ambient_key = table.optional("ambient");
-    let color = |key: &Key<'_>, name| key.color_or_texture(textures, table.limits(name));
+    let color = |key: &TableKey<'_>, name| key.color_or_texture(textures, table.limits(name));
     let (diffuse, specular) = (color(&diffuse_key, "phong.diffuse"), color(&specular_key, "phong.specular"));
-    let is_wrong = |key: &Key<'_>, color: &Option<ColorSource>| key.is_given() && color.is_none();
-    let untold = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
+    let is_wrong = |key: &TableKey<'_>, color: &Option<ColorSource>| key.is_given() && color.is_none();
+    let is_invalid = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
     let specular = specular.unwrap_or(ColorSource::Constant(Vec3::ZERO));
     let are_bytes = [&diffuse_key, &specular_key, &ambient_key]
-        .map(|key| key.is_of_bytes(|span| Issue::warning(span, TOO_MUCH_REFLECTED)));
-    if !untold && are_bytes == [false; 3] {
+        .map(|key| key.reports_bytes(|span| Issue::warning(span, ENERGY_GAIN)));
+    if !is_invalid && are_bytes == [false; 3] {
         warn_about_gain(&diffuse_key, &specular_key, &diffuse, &specular);
     }
     MaterialKind::Phong {
@@ -103,26 +103,27 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     }
 }
 
-const TOO_MUCH_REFLECTED: &str = "this material reflects more light than falls on it";
+/// Message for materials that create energy.
+pub(crate) const ENERGY_GAIN: &str = "this material reflects more light than falls on it";
 
 /// Warns about a material that reflects more light than falls on it.
-fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &ColorSource) {
+fn warn_about_gain(kd_key: &TableKey<'_>, ks_key: &TableKey<'_>, kd: &ColorSource, ks: &ColorSource) {
     let constant = |source: &ColorSource| match source {
         ColorSource::Constant(color) => *color,
         ColorSource::Texture(_) => Vec3::ZERO,
     };
     let sum = constant(kd) + constant(ks);
-    // A sum that is 1 when written down may be above it in binary.
+    // Decimal values that sum to 1 may exceed it in binary.
     let most = sum.max_element();
     let Some(span) = ks_key.span().or(kd_key.span()).filter(|_| most > 1.0 + 1e-5) else { return };
     let channel = ["red", "green", "blue"][sum.max_position()];
-    let issue = Issue::warning(span, TOO_MUCH_REFLECTED)
+    let issue = Issue::warning(span, ENERGY_GAIN)
         .label(format!("diffuse + specular is {:.3} in {channel}", most))
         .help("keep `diffuse` + `specular` at or below 1 in every channel");
     kd_key.context.report(issue);
 }
 
-fn metal(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
+fn metal(table: &TableReader<'_>, textures: &Names) -> Option<MaterialKind> {
     let fresnel = fresnel(table, textures);
     Some(MaterialKind::Metal {
         roughness: number(table, textures, "metal.roughness", 0.2),
@@ -131,7 +132,7 @@ fn metal(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
     })
 }
 
-fn plastic(table: &Table<'_>, textures: &Names) -> MaterialKind {
+fn plastic(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
     MaterialKind::Plastic {
         diffuse: color(table, textures, "plastic.diffuse", 0.7),
         specular: color(table, textures, "plastic.specular", 1.0),
@@ -140,7 +141,7 @@ fn plastic(table: &Table<'_>, textures: &Names) -> MaterialKind {
     }
 }
 
-fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
+fn principled(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
     common::warn_without(table, "clearcoat_roughness", "clearcoat");
     let (color, number) = (
         |path, default| color(table, textures, path, default),
@@ -159,37 +160,40 @@ fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
     }
 }
 
-/// The key of a path `TYPE.KEY`.
-fn key<'a>(table: &Table<'a>, path: &'static str) -> Key<'a> {
+/// The key at a path `TYPE.KEY`.
+fn key<'a>(table: &TableReader<'a>, path: &'static str) -> TableKey<'a> {
     table.optional(path.split_once('.').map_or(path, |(_, name)| name))
 }
 
-/// A colour or a texture, in the range that the definition has for `TYPE.KEY`.
-fn color(table: &Table<'_>, textures: &Names, path: &'static str, default: f32) -> ColorSource {
+/// Reads a color or a texture, in the range defined for `TYPE.KEY`.
+fn color(table: &TableReader<'_>, textures: &Names, path: &'static str, default: f32) -> ColorSource {
     let color = key(table, path).color_or_texture(textures, table.limits(path));
     color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
 }
 
-/// A number or a texture, in the range that the definition has for `TYPE.KEY`.
-fn number(table: &Table<'_>, textures: &Names, path: &'static str, default: f32) -> NumberSource {
+/// Reads a number or a texture, in the range defined for `TYPE.KEY`.
+fn number(table: &TableReader<'_>, textures: &Names, path: &'static str, default: f32) -> NumberSource {
     let number = key(table, path).number_or_texture(textures, table.limits(path));
     number.unwrap_or(NumberSource::Constant(default))
 }
 
-/// An index of refraction.
-fn ior(table: &Table<'_>, path: &'static str) -> f32 {
+/// Reads an index of refraction.
+fn ior(table: &TableReader<'_>, path: &'static str) -> f32 {
     key(table, path).number32(table.limits(path)).unwrap_or(1.5)
 }
 
-/// The reflectance of a metal, which it has by exactly one of three groups of keys.
-fn fresnel(table: &Table<'_>, textures: &Names) -> Option<FresnelSource> {
+/// Reads the reflectance of a metal, which is given by exactly one of three groups of keys.
+fn fresnel(table: &TableReader<'_>, textures: &Names) -> Option<FresnelSource> {
     let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
     let is_index = eta.is_given() || k.is_given();
     let count = [color.is_given(), is_index, element.is_given()].into_iter().filter(|given| *given).count();
     if count > 1 {
         let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_given());
-        let issue = Issue::error(given.and_then(Key::key_span)?, "this metal has its reflectance twice")
-            .help("a metal has exactly one of `color`, `eta` with `k`, and `element`");
+        let issue = Issue::error(
+            given.and_then(TableKey::key_span)?,
+            "the reflectance of this metal is specified twice",
+        )
+        .help("use exactly one of `color`, `eta` with `k`, and `element`");
         table.context.report(issue);
         return None;
     }
@@ -207,23 +211,23 @@ fn fresnel(table: &Table<'_>, textures: &Names) -> Option<FresnelSource> {
     color.color_or_texture(textures, table.limits("metal.color")).map(FresnelSource::Schlick)
 }
 
-fn mirror(table: &Table<'_>, textures: &Names) -> MaterialKind {
+fn mirror(table: &TableReader<'_>, textures: &Names) -> MaterialKind {
     MaterialKind::Mirror { reflectance: color(table, textures, "mirror.reflectance", 0.9) }
 }
 
-fn glass(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
+fn glass(table: &TableReader<'_>, textures: &Names) -> Option<MaterialKind> {
     let ior = ior(table, "glass.ior");
     let (tint, thin) = (table.optional("tint"), table.optional("thin"));
     let rough = table.optional("roughness");
     let roughness = number(table, textures, "glass.roughness", 0.0);
-    // Whoever writes it wrongly hardly means glass that fills its shape.
+    // An invalid `thin` more likely means a pane.
     if !thin.flag().unwrap_or(thin.is_given()) {
         let tint = tint.exact_color(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }
     if roughness != NumberSource::Constant(0.0) {
-        let issue = Issue::error(rough.span()?, "a thin pane is smooth")
-            .help("leave out `thin`, and give rough glass a thickness: a box in place of a quad");
+        let issue = Issue::error(rough.span()?, "thin panes cannot be rough")
+            .help("remove `thin` and give the glass a thickness: use a box instead of a quad");
         table.context.report(issue);
         return None;
     }

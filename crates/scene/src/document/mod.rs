@@ -1,5 +1,5 @@
-//! From TOML to a scene: one file for each family of tables. Every reader goes on after a mistake, so that
-//! all of them are reported, and gives nothing where a value is missing or wrong.
+//! Lowers TOML to a scene, with one file per group of tables. Readers continue after a mistake, so that all are reported, and
+//! return `None` for missing or invalid values.
 
 mod camera;
 mod common;
@@ -22,21 +22,28 @@ use std::path::{Path, PathBuf};
 
 use super::description::{Camera, Environment, Light, Scene};
 use super::keys::limits;
-use super::source::Source;
+use super::read::NEW_SCENE_HELP;
+use super::source::SceneText;
 use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
 use crate::math::Vec3;
 use context::{Context, Issue};
-use table::Table;
+use table::TableReader;
 
 pub(super) use camera::FOV_DEGREES;
+#[cfg(test)]
+pub(super) use context::MORE_LIKE_THESE;
+#[cfg(test)]
+pub(super) use materials::ENERGY_GAIN;
 pub(super) use shapes::is_mesh;
+#[cfg(test)]
+pub(super) use syntax::MISSING_VALUE;
 
-/// Reads and validates a scene; `path` says where the files are that it names.
-pub(super) fn lower(source: &Source, path: &Path) -> Outcome {
+/// Reads and validates a scene. Relative paths are resolved against the folder of `path`.
+pub(super) fn lower(source: &SceneText, path: &Path) -> Outcome {
     let context = Context::new(source.clone(), path);
     let text = source.text();
     if text.trim_start_matches('\u{feff}').trim().is_empty() {
-        let help = "`glimt new FILE` writes a scene to start from";
+        let help = NEW_SCENE_HELP;
         context.report(Issue::error(0..0, "the scene file is empty").help(help));
         return Outcome { scene: None, diagnostics: context.finish(&[]), settings: Vec::new() };
     }
@@ -48,23 +55,23 @@ pub(super) fn lower(source: &Source, path: &Path) -> Outcome {
     let (document, errors) = toml::parse(text);
     let broken_lines = syntax::report(&context, errors);
     let document = sets::put(&context, source, document);
-    let scene = scene(&Table::root(&context, document.root()));
+    let scene = scene(&TableReader::root(&context, document.root()));
     let has_errors = context.has_errors();
     let settings = settings(&document);
     Outcome { scene: scene.filter(|_| !has_errors), diagnostics: context.finish(&broken_lines), settings }
 }
 
-/// The places of the values in the tables that hold settings.
+/// The spans of the values in `[render]` and `[photons]`.
 fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
     let values = |table: &'static str| {
         let entries = document.root().get(table).and_then(|found| match found.value.item() {
-            toml::Item::Table(entries) => Some(entries),
-            toml::Item::String(_)
-            | toml::Item::Integer { .. }
-            | toml::Item::Float(_)
-            | toml::Item::Boolean(_)
-            | toml::Item::Datetime
-            | toml::Item::Array(_) => None,
+            toml::TomlValue::Table(entries) => Some(entries),
+            toml::TomlValue::String(_)
+            | toml::TomlValue::Integer { .. }
+            | toml::TomlValue::Float(_)
+            | toml::TomlValue::Boolean(_)
+            | toml::TomlValue::Datetime
+            | toml::TomlValue::Array(_) => None,
         });
         let of =
             move |one: toml::KeyValue<'_>| Setting { table, key: one.key.to_owned(), span: one.value.span() };
@@ -73,34 +80,36 @@ fn settings(document: &toml::Document<'_>) -> Vec<Setting> {
     ["render", "photons"].into_iter().flat_map(values).collect()
 }
 
-/// The camera of a scene, if that is right.
-pub(super) fn camera_of(source: &Source) -> Option<Camera> {
+/// The camera of a scene. `None` if there are errors.
+pub(super) fn camera_of(source: &SceneText) -> Option<Camera> {
     let context = Context::new(source.clone(), Path::new(""));
     let (document, errors) = toml::parse(source.text());
     let document = sets::put(&context, source, document);
-    let camera = camera::read(&Table::root(&context, document.root()));
+    let camera = camera::read(&TableReader::root(&context, document.root()));
     camera.filter(|_| errors.is_empty() && !context.has_errors())
 }
 
-/// The files that a text names, whatever else it says.
+/// The files that a scene text references, even if it has errors.
 pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
     fn gather(table: toml::Entries<'_>, names: &mut Vec<String>) {
         for toml::KeyValue { key, value, .. } in table.iter() {
             match value.item() {
-                toml::Item::String(name) if matches!(key, "file" | "orbiter") => names.push(name.to_owned()),
-                toml::Item::Table(inner) => gather(inner, names),
-                toml::Item::Array(array) => {
+                toml::TomlValue::String(name) if matches!(key, "file" | "orbiter") => {
+                    names.push(name.to_owned())
+                }
+                toml::TomlValue::Table(inner) => gather(inner, names),
+                toml::TomlValue::Array(array) => {
                     for element in array.iter() {
-                        if let toml::Item::Table(inner) = element.item() {
+                        if let toml::TomlValue::Table(inner) = element.item() {
                             gather(inner, names);
                         }
                     }
                 }
-                toml::Item::String(_)
-                | toml::Item::Integer { .. }
-                | toml::Item::Float(_)
-                | toml::Item::Boolean(_)
-                | toml::Item::Datetime => {}
+                toml::TomlValue::String(_)
+                | toml::TomlValue::Integer { .. }
+                | toml::TomlValue::Float(_)
+                | toml::TomlValue::Boolean(_)
+                | toml::TomlValue::Datetime => {}
             }
         }
     }
@@ -110,8 +119,8 @@ pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
-/// The whole file. Names are gathered before what refers to them.
-fn scene(root: &Table<'_>) -> Option<Scene> {
+/// Reads the whole file. Definitions of names are read before references.
+fn scene(root: &TableReader<'_>) -> Option<Scene> {
     let (render, output) = render::read(root);
     let camera = camera::read(root);
     let photons = photons::read(root);
@@ -141,7 +150,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
         textures.names.warn_about_unused(root.context);
         materials.names.warn_about_unused(root.context);
         warn_about_darkness(root.context, &scene);
-        // Where a mesh is, is not known before it is loaded.
+        // With meshes, wait until their bounds are known.
         if scene.mesh_files.is_empty() {
             for span in facing::away(&scene, Vec::new) {
                 root.context
@@ -153,24 +162,30 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     Some(scene)
 }
 
-/// Warns about a scene without shapes, or without light.
+/// Message for scenes without light.
+pub(super) const UNLIT_SCENE: &str = "nothing lights this scene";
+/// End of the messages about degenerate shapes.
+pub(super) const NO_AREA: &str = "has no area";
+
+/// Warns about a scene without shapes or light.
 fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     if scene.objects.is_empty() {
-        let help = "add one, such as a [[sphere]]; until then the picture is the background";
+        let help = "add one, such as a [[sphere]]; until then the image shows the background";
         context.report(Issue::warning(0..0, "the scene has no shapes").help(help));
         return;
     }
-    let own_materials = scene.objects.iter().any(|object| object.material.is_none());
+    let has_file_materials = scene.objects.iter().any(|object| object.material.is_none());
     let emits = |index: usize| scene.materials[index].emits();
-    let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
-    let lights = scene.lights.iter().any(Light::sends) || scene.environment.iter().any(Environment::sends);
-    // `path` and photons have light of their own in its place.
+    let has_emitters = scene.objects.iter().filter_map(|object| object.material).any(emits);
+    let has_lights =
+        scene.lights.iter().any(Light::sends) || scene.environment.iter().any(Environment::sends);
+    // `path` and photons compute indirect light instead of using `ambient`.
     let method = scene.render.integrator.method();
-    let is_ambient = method.honours_ambient
+    let has_ambient = method.honors_ambient
         && scene.render.ambient != Vec3::ZERO
         && !(method.gathers && scene.photons.enabled);
-    if !lights && !own_materials && !lamps && !is_ambient {
+    if !has_lights && !has_file_materials && !has_emitters && !has_ambient {
         let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
-        context.report(Issue::warning(0..0, "nothing lights this scene").help(help));
+        context.report(Issue::warning(0..0, UNLIT_SCENE).help(help));
     }
 }

@@ -1,4 +1,4 @@
-//! Names that the file gives to things, and whether they are used.
+//! Names defined in the file, and whether they are used.
 
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -8,7 +8,7 @@ use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 
-/// The textures or the materials of a file.
+/// The names of a file's textures or materials.
 pub(super) struct Names {
     /// `texture` or `material`.
     pub(super) kind: &'static str,
@@ -16,6 +16,7 @@ pub(super) struct Names {
     indices: HashMap<String, usize>,
 }
 
+/// A defined name.
 struct Entry {
     name: String,
     span: Range<usize>,
@@ -30,28 +31,28 @@ impl Names {
         Self { kind, entries, indices }
     }
 
-    /// The place of a name by its index; the start of the file for one that is not there.
+    /// The span of a name. The start of the file if the index is out of range.
     pub(super) fn span(&self, index: usize) -> Range<usize> {
         self.entries.get(index).map_or(0..0, |entry| entry.span.clone())
     }
 
-    /// The index of a name, which is used from now on.
+    /// Looks up a name and marks it as used.
     pub(super) fn find(&self, name: &str) -> Option<usize> {
         let index = *self.indices.get(name)?;
         self.entries[index].used.set(true);
         Some(index)
     }
 
-    /// Adds to an issue about an unknown name what there is.
+    /// Adds the known names and the most similar one to an issue about an unknown name.
     pub(super) fn advise(&self, context: &Context<'_>, issue: Issue, name: &str) -> Issue {
-        const MOST: usize = 12;
+        const MAX_LISTED: usize = 12;
         let kind = self.kind;
         let known = || self.entries.iter().map(|entry| entry.name.as_str());
         let quoted = |name: &str| format!("\"{}\"", shortened(name, 40));
-        let list = known().take(MOST).map(quoted).collect::<Vec<_>>().join(", ");
+        let list = known().take(MAX_LISTED).map(quoted).collect::<Vec<_>>().join(", ");
         let help = match self.entries.len() {
-            0 => format!("the scene has no {kind}s; a table [{kind}s.NAME] makes one"),
-            count if count > MOST => format!("there are {list} and {} more", count - MOST),
+            0 => format!("the scene has no {kind}s; define one with [{kind}s.NAME]"),
+            count if count > MAX_LISTED => format!("there are {list} and {} more", count - MAX_LISTED),
             1 => format!("there is {list}"),
             _ => format!("there are {list}"),
         };
@@ -62,7 +63,7 @@ impl Names {
         }
     }
 
-    /// A warning for each name that nothing referred to. Only worth it where everything else is right.
+    /// Warns about each unused name. Call this only for scenes without errors.
     pub(super) fn warn_about_unused(&self, context: &Context<'_>) {
         for entry in self.entries.iter().filter(|entry| !entry.used.get()) {
             let message = format!("the {} \"{}\" is not used", self.kind, shortened(&entry.name, 40));
@@ -75,12 +76,12 @@ impl Names {
 mod tests {
     use std::path::Path;
 
-    use super::super::super::source::Source;
+    use super::super::super::source::SceneText;
     use super::*;
 
-    /// Comparisons that as many wrong names cost as there are names.
+    /// Number of comparisons for `count` unknown names among `count` names.
     fn comparisons(count: usize) -> usize {
-        let context = Context::new(Source::file("".into()), Path::new("scene.toml"));
+        let context = Context::new(SceneText::file("".into()), Path::new("scene.toml"));
         let names = Names::new("material", (0..count).map(|number| (format!("name{number}"), 0..0)));
         for number in 0..count {
             names.advise(&context, Issue::error(0..0, "wrong"), &format!("nome{number}"));
@@ -89,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn many_wrong_names_among_many_are_compared_in_linear_time() {
+    fn name_suggestions_take_linear_time() {
         assert_eq!(comparisons(10), 100);
         for count in [1_000, 10_000, 50_000] {
             assert!(comparisons(count) <= 250_000, "{count} names: {}", comparisons(count));

@@ -1,9 +1,9 @@
 //! `[photons]`.
 
 use super::super::description::Photons;
-use super::table::Table;
+use super::table::TableReader;
 
-pub(super) fn read(root: &Table<'_>) -> Option<Photons> {
+pub(super) fn read(root: &TableReader<'_>) -> Option<Photons> {
     let default = Photons { enabled: false, count: 0, radius: 0.0, bounces: 16 };
     let Some(table) = root.table("photons") else { return Some(default) };
     let photons = Photons {

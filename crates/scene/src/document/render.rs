@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use super::super::description::{MOST_SCATTERINGS, Render, render_keys};
+use super::super::description::{MAX_BOUNCES, Render, render_keys};
 use super::super::keys::endings::IMAGES;
 use super::context::Issue;
 use super::limits::Limits;
-use super::table::Table;
+use super::table::TableReader;
 
 const MAX_PIXELS: u64 = 1 << 30;
 
@@ -32,8 +32,8 @@ macro_rules! reader {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Reads every key; what is absent or wrong has its default.
-        fn settings(table: &Table<'_>) -> Render {
+        /// Reads all keys. Absent and invalid ones get their defaults.
+        fn settings(table: &TableReader<'_>) -> Render {
             let key = |name| table.optional(name);
             Render {
                 $($name: read!(key(stringify!($name)), $range $(($($limit),*))?).unwrap_or(Render::DEFAULT.$name),)*
@@ -44,8 +44,8 @@ macro_rules! reader {
 
 render_keys!(reader);
 
-/// The settings, and where the picture goes if the scene says so.
-pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
+/// Reads the settings and the output path, if the scene has one.
+pub(super) fn read(root: &TableReader<'_>) -> (Option<Render>, Option<PathBuf>) {
     let Some(table) = root.table("render") else { return (Some(Render::DEFAULT), None) };
     let render = settings(&table);
     let output = output(&table);
@@ -54,19 +54,19 @@ pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
     (Some(render), output)
 }
 
-fn output(table: &Table<'_>) -> Option<PathBuf> {
+fn output(table: &TableReader<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
-    let text = key.text("the path of a picture, such as \"picture.png\"")?;
+    let text = key.text("the path of an image, such as \"image.png\"")?;
     key.has_ending(text, IMAGES).then(|| table.context.resolve(text))
 }
 
-fn check_size(table: &Table<'_>, render: &Render) {
+fn check_size(table: &TableReader<'_>, render: &Render) {
     let Render { width, height, .. } = *render;
     let spans = || table.optional("width").span().or(table.optional("height").span());
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         let issue =
             Issue::error(spans().unwrap_or_default(), format!("{width} × {height} pixels are too many"))
-                .help(format!("a picture has at most {MAX_PIXELS} pixels"));
+                .help(format!("the limit is {MAX_PIXELS} pixels"));
         table.context.report(issue);
     }
 }
@@ -78,7 +78,7 @@ mod tests {
     use super::super::super::description::{KeyRange, Render};
     use super::super::super::{Outcome, parse, starter};
 
-    /// The settings of a scene whose `[render]` has this line; or the messages.
+    /// Reads the settings of a scene with this line in `[render]`. The error has the messages.
     fn read(line: &str) -> Result<Render, Vec<String>> {
         let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
         let Outcome { scene, diagnostics, .. } =
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_has_its_default_and_accepts_it() {
+    fn every_key_accepts_its_default() {
         assert_eq!(read(""), Ok(Render::DEFAULT));
         for key in Render::keys() {
             let line = format!("{} = {}", key.name, key.default);
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn every_key_accepts_its_range_and_nothing_beside_it() {
+    fn every_key_accepts_exactly_its_range() {
         for key in Render::keys() {
             let (name, mut accepted, mut refused) = (key.name, Vec::new(), Vec::new());
             match key.range {
@@ -120,7 +120,7 @@ mod tests {
                 }
             }
             for value in accepted {
-                // A picture of the greatest width is a low one.
+                // Keep the number of pixels within the limit.
                 let other = match name {
                     "width" => "height = 1\n",
                     "height" => "width = 1\n",
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_starter_scene_shows_every_key_with_its_choices() {
+    fn starter_shows_every_key_and_choice() {
         let table = starter().split("[camera]").next().unwrap_or_default();
         for key in Render::keys() {
             let shown = |line: &&str| line.trim_start_matches("# ").starts_with(&format!("{} = ", key.name));

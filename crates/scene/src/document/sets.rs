@@ -1,34 +1,38 @@
-//! Values that the call sets in a scene.
+//! Applies `--set` values to a document.
 
 use super::super::nearest::nearest;
 use super::super::sanitize::shortened;
-use super::super::source::Source;
-use super::super::toml::{Document, Layout, NoPlace, Why, set};
+use super::super::source::SceneText;
+use super::super::toml::{Document, KeyError, KeyErrorKind, Layout, set};
 use super::context::{Context, Issue};
 use super::shapes;
 
-/// The tables that a key may lead through.
+/// The groups and lists of a scene.
 const LAYOUT: Layout =
     Layout { groups: &["materials", "textures"], is_list: |name| name == "light" || shapes::is_kind(name) };
 
-/// The document with all that is set; what leads nowhere is reported.
-pub(super) fn put<'s>(context: &Context<'_>, source: &'s Source, mut document: Document<'s>) -> Document<'s> {
+/// Applies all `--set` values and reports keys that cannot be set.
+pub(super) fn put<'s>(
+    context: &Context<'_>,
+    source: &'s SceneText,
+    mut document: Document<'s>,
+) -> Document<'s> {
     for at in source.sets() {
         let placed;
         (document, placed) = set(document, source.all(), at, LAYOUT);
-        if let Err(no_place) = placed {
-            context.report(issue(no_place));
+        if let Err(key_error) = placed {
+            context.report(issue(key_error));
         }
     }
     document
 }
 
-fn issue(NoPlace { span, above, part, why }: NoPlace) -> Issue {
+fn issue(KeyError { span, above, part, why }: KeyError) -> Issue {
     let list = shortened(&above.join("."), 40);
     let part = shortened(&part, 40);
     let quoted = |names: &[String]| {
-        const MOST: usize = 12;
-        let names = names.iter().take(MOST).map(|name| format!("`{}`", shortened(name, 40)));
+        const MAX_LISTED: usize = 12;
+        let names = names.iter().take(MAX_LISTED).map(|name| format!("`{}`", shortened(name, 40)));
         names.collect::<Vec<_>>().join(", ")
     };
     let near = |issue: Issue, names: &[String]| match nearest(&part, names.iter().map(String::as_str)) {
@@ -36,18 +40,18 @@ fn issue(NoPlace { span, above, part, why }: NoPlace) -> Issue {
         None => issue,
     };
     match why {
-        Why::Unknown { known } => {
+        KeyErrorKind::Unknown { known } => {
             let issue = Issue::error(span, format!("the scene has no table [{list}.{part}]"));
             let help = if known.is_empty() {
-                "it has none of this kind".to_owned()
+                format!("the scene has no {list}")
             } else {
                 format!("there are {}", quoted(&known))
             };
             near(issue, &known).help(help)
         }
-        Why::NoEntry { count: 0, .. } => Issue::error(span, format!("the scene has no [[{list}]]")),
-        Why::NoEntry { count, names } => {
-            let issue = Issue::error(span, format!("there is no [[{list}]] number or name `{part}`"));
+        KeyErrorKind::NoEntry { count: 0, .. } => Issue::error(span, format!("the scene has no [[{list}]]")),
+        KeyErrorKind::NoEntry { count, names } => {
+            let issue = Issue::error(span, format!("there is no [[{list}]] with number or name `{part}`"));
             let by_name = if names.is_empty() {
                 String::new()
             } else {
@@ -55,11 +59,13 @@ fn issue(NoPlace { span, above, part, why }: NoPlace) -> Issue {
             };
             near(issue, &names).help(format!("expected a number from 1 to {count}{by_name}"))
         }
-        Why::Ambiguous { count } => Issue::error(span, format!("{count} [[{list}]] have the name `{part}`"))
-            .help("give its number, from 1"),
-        Why::Element => {
-            Issue::error(span, format!("`{list}` is an array of values, which is set as a whole"))
-                .help(format!("such as {list}=[0, 1, 2]"))
+        KeyErrorKind::Ambiguous { count } => {
+            Issue::error(span, format!("{count} [[{list}]] have the name `{part}`"))
+                .help("use its number, from 1")
+        }
+        KeyErrorKind::Element => {
+            Issue::error(span, format!("`{list}` is an array of values and can only be set as a whole"))
+                .help(format!("for example {list}=[0, 1, 2]"))
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Errors of the TOML itself, in plain words.
+//! Reports TOML syntax errors in plain language.
 
 use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,14 +8,13 @@ use super::super::sanitize::shortened;
 use super::super::toml::{Bracket, SyntaxError, brackets, last_open};
 use super::context::{Context, Issue};
 
-/// Reports the first error of each line; the others follow from it. Gives the lines that are not to be
-/// trusted, in order: those with errors, and those under a broken header, whose keys seem to be another
-/// table's.
+/// Reports the first error of each line, as others are usually its consequences. Returns the unreliable lines, in order:
+/// those with errors, and those after a broken header, whose keys appear to be in another table.
 pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec<Range<usize>> {
-    let lists = Lists { text: context.file(), brackets: OnceCell::new() };
+    let lists = ArrayBrackets { text: context.file(), brackets: OnceCell::new() };
     let (mut lines, mut firsts) = (BTreeSet::new(), Vec::new());
     errors.sort_by_key(|error| error.span.start);
-    // Lists that are not closed, by their lines.
+    // Unclosed lists, by line.
     let (mut in_open_array, mut opened) = (false, BTreeMap::new());
     for error in errors {
         let lacks_comma = error.what == MISSING_COMMA;
@@ -25,7 +24,7 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
             continue;
         }
         match unclosed(context, &lists, &error) {
-            // All that follows up to here was taken for a part of the list.
+            // The parser took all lines up to here for part of the list.
             Some(open) => {
                 lines.extend(context.line(open)..context.line(error.span.start));
                 opened.insert(context.line(open), open);
@@ -33,13 +32,13 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
             None => firsts.push(error),
         }
     }
-    // The parser takes the end of the file for the end of a list. Of one that is too deep it does not look for the end.
+    // The parser does not report a list that is unclosed at the end of the file. Lists that are nested too deeply may be closed.
     if let Some(open) = open_at_end(context.file()).filter(|_| !firsts.iter().any(is_too_deep)) {
         lines.insert(context.line(open));
         opened.insert(context.line(open), open);
     }
     for error in firsts {
-        // What stands after an open bracket in its line follows from it.
+        // Ignore errors after an unclosed bracket on the same line.
         let open = opened.get(&context.line(error.span.start));
         if open.is_none_or(|open| error.span.start < *open) {
             context.report(issue(context, &lists, error).syntax());
@@ -52,14 +51,14 @@ pub(super) fn report(context: &Context<'_>, mut errors: Vec<SyntaxError>) -> Vec
     lines.into_iter().map(|line| line..end_of_damage(context, line)).collect()
 }
 
-/// The lists of a broken text.
-struct Lists<'a> {
+/// The array brackets of a text with syntax errors.
+struct ArrayBrackets<'a> {
     text: &'a str,
     brackets: OnceCell<Vec<Bracket>>,
 }
 
-impl Lists<'_> {
-    /// The bracket of the innermost list that is open at a byte.
+impl ArrayBrackets<'_> {
+    /// The opening bracket of the innermost list open at byte `end`.
     fn open_at(&self, end: usize) -> Option<usize> {
         let all = self.brackets.get_or_init(|| brackets(self.text));
         last_open(&all[..all.partition_point(|bracket| bracket.at < end)])
@@ -68,11 +67,10 @@ impl Lists<'_> {
 
 const MISSING_COMMA: &str = "missing comma between array elements";
 
-/// The place of the bracket that an error follows from, as its list is not closed: what stands in a later line is a key or
-/// a header.
+/// The unclosed bracket that causes an error: the list continues into a line with a key or a header.
 fn unclosed(
     context: &Context<'_>,
-    lists: &Lists<'_>,
+    lists: &ArrayBrackets<'_>,
     SyntaxError { span, what, .. }: &SyntaxError,
 ) -> Option<usize> {
     if what == "unclosed array" {
@@ -90,12 +88,13 @@ fn is_too_deep(error: &SyntaxError) -> bool {
     error.what.contains("recurs")
 }
 
-/// Whether a line begins with a key and its `=`.
+/// Whether a line starts with a key and `=`.
 fn is_key(line: &str) -> bool {
     line.split_once('=').is_some_and(|(key, _)| !key.contains(['[', '{', ',', '\"', '#']))
 }
 
-/// The place of a list that the file ends in, found from the last line that begins with a key on: the text may be long.
+/// The opening bracket of a list that is unclosed at the end of the file. Searches only from the last key, as texts may be
+/// long.
 fn open_at_end(text: &str) -> Option<usize> {
     let mut start = text.len();
     loop {
@@ -107,7 +106,7 @@ fn open_at_end(text: &str) -> Option<usize> {
     }
 }
 
-/// Way to close a list: all of the list, if it holds numbers in one line.
+/// Help for an unclosed list: the whole list, if it consists of numbers on one line.
 fn closed(context: &Context<'_>, open: usize) -> String {
     let end =
         context.text(&(open..context.file().len())).find('\n').map_or(context.file().len(), |at| open + at);
@@ -117,8 +116,8 @@ fn closed(context: &Context<'_>, open: usize) -> String {
     }
 }
 
-/// Issue about missing commas between the values of a list in one line; `at` is the place of the first.
-fn with_commas(context: &Context<'_>, lists: &Lists<'_>, at: usize) -> Option<String> {
+/// Message about missing commas in a list on one line. `at` is the position of the first.
+fn with_commas(context: &Context<'_>, lists: &ArrayBrackets<'_>, at: usize) -> Option<String> {
     let open = lists.open_at(at)?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
     let line = context.line_text(context.line(at))?;
@@ -132,7 +131,7 @@ fn with_commas(context: &Context<'_>, lists: &Lists<'_>, at: usize) -> Option<St
     Some(format!("{words}: write {list}"))
 }
 
-/// Issue about numbers in one line in other brackets: `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0, 1, 0)`.
+/// Issue about a list of numbers in the wrong brackets: `(0, 1, 0)`, `{0, 1, 0}`, `vec3(0, 1, 0)`.
 fn in_other_brackets(context: &Context<'_>, at: usize) -> Option<Issue> {
     let line = context.line_text(context.line(at))?;
     let line_start = context.text(&(0..at)).rfind('\n').map_or(0, |end| end + 1);
@@ -142,11 +141,11 @@ fn in_other_brackets(context: &Context<'_>, at: usize) -> Option<Issue> {
     let inner = value.trim_start_matches(name).strip_prefix(['(', '{', '<'])?;
     let list = of_numbers(inner)?;
     let start = line_start + key.len() + 1 + after.find(value)?;
-    let issue = Issue::error(start..start + value.len(), format!("a list stands in brackets: write {list}"));
+    let issue = Issue::error(start..start + value.len(), format!("lists use square brackets: write {list}"));
     Some(issue)
 }
 
-/// The list that is meant by numbers apart from each other, with or without a bracket of any kind at their end.
+/// Formats separated numbers as a list, ignoring any closing bracket.
 fn of_numbers(text: &str) -> Option<String> {
     let text = text.split('#').next().unwrap_or_default().trim();
     let values = values(text.strip_suffix([']', ')', '}', '>']).unwrap_or(text));
@@ -160,19 +159,19 @@ fn of_numbers(text: &str) -> Option<String> {
     listed(&values).filter(|_| values.iter().all(is_number))
 }
 
-/// Values between commas, semicolons and spaces.
+/// Splits at commas, semicolons and white space.
 fn values(text: &str) -> Vec<&str> {
     text.split([',', ';', ' ', '\t']).map(str::trim).filter(|value| !value.is_empty()).collect()
 }
 
-/// Several values as a list, if it is short.
+/// Formats several values as a list, if it is short.
 fn listed(values: &[&str]) -> Option<String> {
     const LONGEST: usize = 60;
     let list = format!("[{}]", values.join(", "));
     (values.len() > 1 && list.len() <= LONGEST).then_some(list)
 }
 
-/// The line after the last one that suffers from an error in a line.
+/// The end of the lines affected by an error: the next header after a broken header, otherwise the next line.
 fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
     let is_header = |line: usize| context.line_text(line).map(|text| text.trim_start().starts_with('['));
     if is_header(line) != Some(true) {
@@ -181,7 +180,7 @@ fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
     (line + 1..).find(|next| is_header(*next) != Some(false)).unwrap_or(usize::MAX)
 }
 
-/// The number around a place.
+/// The number around `span`.
 fn number_at<'c>(context: &'c Context<'_>, span: &Range<usize>) -> &'c str {
     let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
     let (mut start, mut end) = (span.start, span.end);
@@ -194,7 +193,7 @@ fn number_at<'c>(context: &'c Context<'_>, span: &Range<usize>) -> &'c str {
     context.text(&(start..end))
 }
 
-/// A number with the digits around its point that it lacks. `None` if that makes no number of it.
+/// Adds missing digits before or after the decimal point. `None` if the result is not a number.
 fn with_digits(number: &str) -> Option<String> {
     let unsigned = number.trim_start_matches(['+', '-']);
     let sign = &number[..number.len() - unsigned.len()];
@@ -207,7 +206,7 @@ fn with_digits(number: &str) -> Option<String> {
     (has_digit && whole != number && whole.parse::<f64>().is_ok()).then_some(whole)
 }
 
-fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue {
+fn issue(context: &Context<'_>, lists: &ArrayBrackets<'_>, error: SyntaxError) -> Issue {
     let is_deep = is_too_deep(&error);
     let SyntaxError { span, what, expected } = error;
     if let Some(issue) = in_other_brackets(context, span.start) {
@@ -217,12 +216,12 @@ fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue 
     let written = shortened(context.text(&span), 40);
     let error = |words: &str| Issue::error(span.clone(), words);
     match what.as_str() {
-        "duplicate key" => Issue::error(span, format!("`{written}` is given twice"))
-            .label("the second time")
-            .help("keep one of the two; a shape's header has double brackets, such as [[sphere]]"),
+        "duplicate key" => Issue::error(span, format!("`{written}` is defined twice"))
+            .label("second definition")
+            .help("remove one of them; headers of shapes have double brackets, such as [[sphere]]"),
         MISSING_COMMA => match with_commas(context, lists, span.start) {
             Some(words) => error(&words),
-            None => error("a comma is missing").help("expected `,`, or `]` where the list ends"),
+            None => error("a comma is missing").help("expected `,` or the closing `]`"),
         },
         "unclosed array" => error("this list is not closed").help("expected `]`"),
         "unclosed table" | "unclosed array table" => {
@@ -235,16 +234,18 @@ fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue 
             };
             error("digits are missing in this number").help(help)
         }
-        "unexpected key or value" => error("there is more on this line than one value")
-            .help("expected the end of the line; several numbers stand in brackets, such as [0, 1, 0]"),
-        "key with no value" => error("a key without a value").help("expected `=`"),
+        "unexpected key or value" => error("unexpected text after the value")
+            .help("expected the end of the line; put several numbers in brackets, such as [0, 1, 0]"),
+        "key with no value" => error("this key has no value").help("expected `=`"),
         "invalid unquoted key" if written.starts_with("//") => {
-            error("this is not a key").help("comments begin with #")
+            error("this is not a key").help("comments start with #")
         }
         what if what.ends_with("basic string") || what.ends_with("literal string") => {
-            error("this text is not closed").help(format!("expected {expected} at its end"))
+            error("this string is not closed").help(format!("expected a closing {expected}"))
         }
-        _ if is_deep => error("arrays or tables are nested too deeply").help("a scene needs three levels"),
+        _ if is_deep => {
+            error("arrays or tables are nested too deeply").help("scenes need at most three levels")
+        }
         what if what.contains("must be quoted") => match with_commas(context, lists, span.start) {
             Some(words) => error(&words),
             None => not_a_value(span, &written),
@@ -260,16 +261,19 @@ fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue 
     }
 }
 
-/// Issue about a text without quotes, which is no TOML value.
+/// Message for a key without a value.
+pub(crate) const MISSING_VALUE: &str = "a value is missing";
+
+/// Issue about a missing value, an invalid number or an unquoted string.
 fn not_a_value(span: Range<usize>, written: &str) -> Issue {
-    const VALUES: &str = "expected a number, true or false, a text in quotes, or values in brackets";
+    const VALUES: &str = "expected a number, true, false, a quoted string, or values in brackets";
     if written.trim().is_empty() {
-        return Issue::error(span, "a value is missing").help(VALUES);
+        return Issue::error(span, MISSING_VALUE).help(VALUES);
     }
     if written.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
         return Issue::error(span, format!("`{written}` is not a number")).help(VALUES);
     }
-    Issue::error(span, "a text must stand in quotes").label(format!("write \"{written}\""))
+    Issue::error(span, "strings must be quoted").label(format!("write \"{written}\""))
 }
 
 #[cfg(test)]
@@ -277,7 +281,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_digits_that_a_number_lacks_are_written_for_it() {
+    fn missing_digits_are_added() {
         for (number, whole) in [
             (".3", Some("0.3")),
             ("-.5", Some("-0.5")),

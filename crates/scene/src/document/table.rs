@@ -1,20 +1,20 @@
-//! A TOML table that knows its keys which readers asked for.
+//! A TOML table that records which keys were read.
 
 use std::cell::RefCell;
 use std::fmt;
 use std::ops::{Range, RangeInclusive};
 
-use super::super::keys::key::Kind;
+use super::super::keys::key::ValueKind;
 use super::super::keys::table as table_info;
 use super::super::nearest::{meant, nearest};
 use super::super::sanitize::shortened;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{Context, Issue};
-use super::key::Key;
+use super::key::TableKey;
 use super::limits::Limits;
-use super::value::{Item, Value, found};
+use super::value::{TomlValue, Value, found};
 
-/// Name of a table in messages.
+/// How messages refer to a table.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Title<'a> {
     /// The file itself.
@@ -25,7 +25,7 @@ pub(super) enum Title<'a> {
     List(&'static str),
     /// `[materials.wall]`
     Named(&'static str, &'a str),
-    /// A key whose value is in braces.
+    /// An inline table, by its key.
     Key(&'static str),
 }
 
@@ -41,10 +41,10 @@ impl fmt::Display for Title<'_> {
     }
 }
 
-/// A table of the file. Ask for its keys, then [`Table::finish`] it.
-pub(super) struct Table<'a> {
+/// A table of the file. Read its keys, then call [`TableReader::finish`].
+pub(super) struct TableReader<'a> {
     pub(super) context: &'a Context<'a>,
-    /// Its header, or its braces.
+    /// Byte range of its header or braces.
     pub(super) span: Range<usize>,
     title: Title<'a>,
     entries: Entries<'a>,
@@ -53,7 +53,7 @@ pub(super) struct Table<'a> {
     missing: RefCell<Vec<(&'static str, &'static str)>>,
 }
 
-impl<'a> Table<'a> {
+impl<'a> TableReader<'a> {
     fn new(context: &'a Context<'a>, entries: Entries<'a>, span: Range<usize>, title: Title<'a>) -> Self {
         let (known, unavailable, missing) = Default::default();
         Self { context, span, title, entries, known, unavailable, missing }
@@ -64,10 +64,10 @@ impl<'a> Table<'a> {
         Self::new(context, entries, 0..0, Title::Root)
     }
 
-    /// A value as a table; reports an error if it is something else.
+    /// Reads a value as a table. Reports an error if it is not one.
     pub(super) fn of(context: &'a Context<'a>, value: Value<'a>, title: Title<'a>) -> Option<Self> {
         match value.item() {
-            Item::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
+            TomlValue::Table(entries) => Some(Self::new(context, entries, value.span(), title)),
             other => {
                 let mut issue = Issue::error(value.span(), format!("{title} must be a table"));
                 if is_array_of_tables(&other) {
@@ -81,52 +81,57 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// A key that may be absent.
-    pub(super) fn optional(&self, name: &'static str) -> Key<'a> {
+    /// Reads an optional key.
+    pub(super) fn optional(&self, name: &'static str) -> TableKey<'a> {
         let mut known = self.known.borrow_mut();
         if !known.contains(&name) {
             known.push(name);
         }
         let entry = self.entries.get(name);
-        Key::new(self.context, name, entry.as_ref().map(|one| one.span.clone()), entry.map(|one| one.value))
+        TableKey::new(
+            self.context,
+            name,
+            entry.as_ref().map(|one| one.span.clone()),
+            entry.map(|one| one.value),
+        )
     }
 
-    /// The range of a key by the definition of this table; with `TYPE.` before it, of that type.
+    /// The defined range of a key, `KEY` or `TYPE.KEY`.
     pub(super) fn limits(&self, name: &str) -> Limits {
         match self.kind_of(name) {
             Some(
-                Kind::Number(limits)
-                | Kind::Color(limits)
-                | Kind::ColorOrTexture(limits)
-                | Kind::Emission(limits)
-                | Kind::NumberOrTexture(limits)
-                | Kind::Numbers(_, _, limits)
-                | Kind::Scale(limits),
+                ValueKind::Number(limits)
+                | ValueKind::Color(limits)
+                | ValueKind::ColorOrTexture(limits)
+                | ValueKind::Emission(limits)
+                | ValueKind::NumberOrTexture(limits)
+                | ValueKind::Numbers(_, _, limits)
+                | ValueKind::Scale(limits),
             ) => limits,
             Some(
-                Kind::Whole(..)
-                | Kind::Flag
-                | Kind::Words(_)
-                | Kind::Text
-                | Kind::File(_)
-                | Kind::Texture
-                | Kind::Heights
-                | Kind::Material,
+                ValueKind::Whole(..)
+                | ValueKind::Flag
+                | ValueKind::Words(_)
+                | ValueKind::Text
+                | ValueKind::File(_)
+                | ValueKind::Texture
+                | ValueKind::Heights
+                | ValueKind::Material,
             )
             | None => Limits::Any,
         }
     }
 
-    /// The range of a whole number by the definition of this table.
+    /// The defined range of an integer key.
     pub(super) fn range(&self, name: &str) -> RangeInclusive<i128> {
         match self.kind_of(name) {
-            Some(Kind::Whole(least, most)) => least.into()..=most.into(),
+            Some(ValueKind::Whole(least, most)) => least.into()..=most.into(),
             Some(_) | None => 0..=u32::MAX.into(),
         }
     }
 
-    /// The kind of a key by the definition. A test compares the definition with the keys that readers ask for.
-    fn kind_of(&self, name: &str) -> Option<Kind> {
+    /// The defined type of a key. A test compares the definitions with the keys that are read.
+    fn kind_of(&self, name: &str) -> Option<ValueKind> {
         let info = match self.title {
             Title::Table(table) | Title::List(table) | Title::Named(table, _) => table_info(table)?,
             Title::Root | Title::Key(_) => return None,
@@ -138,8 +143,8 @@ impl<'a> Table<'a> {
         info.keys_of(kind).find(|key| key.name == name).map(|key| key.kind)
     }
 
-    /// A key that must be there; `example` is what may stand after its `=`.
-    pub(super) fn required(&self, name: &'static str, example: &'static str) -> Key<'a> {
+    /// Reads a required key. `example` is a valid value for the help text.
+    pub(super) fn required(&self, name: &'static str, example: &'static str) -> TableKey<'a> {
         let key = self.optional(name);
         if !key.is_given() {
             self.missing.borrow_mut().push((name, example));
@@ -147,7 +152,7 @@ impl<'a> Table<'a> {
         key
     }
 
-    /// A key or table that other versions have: an error if it is used.
+    /// Reports an error if the key `name`, which is not allowed here, is present.
     pub(super) fn unavailable(&self, name: &'static str, message: &str, help: Option<&str>) {
         let key = self.optional(name);
         self.unavailable.borrow_mut().push(name);
@@ -156,13 +161,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The table of this name in the file, `[name]`.
+    /// The table `[name]`.
     pub(super) fn table(&self, name: &'static str) -> Option<Self> {
         let value = self.optional(name).value?;
         Self::of(self.context, value, Title::Table(name))
     }
 
-    /// The tables `[name.…]` with their names and the places of those, in the order of the file.
+    /// The tables `[name.NAME]` with their names and the spans of the names, in file order.
     pub(super) fn named_tables(&self, name: &'static str) -> Vec<(String, Range<usize>, Option<Self>)> {
         let Some(group) = self.table(name) else { return Vec::new() };
         let mut entries: Vec<_> = group.entries.iter().collect();
@@ -171,7 +176,7 @@ impl<'a> Table<'a> {
         entries.into_iter().map(|one| (one.key.to_owned(), one.span, read(one.key, one.value))).collect()
     }
 
-    /// The tables `[[name]]` of the file.
+    /// The tables `[[name]]`.
     pub(super) fn tables(&self, name: &'static str) -> impl Iterator<Item = Self> + use<'a> {
         let context = self.context;
         let key = self.optional(name);
@@ -190,8 +195,7 @@ impl<'a> Table<'a> {
         values.filter_map(move |value| Self::of(context, value, Title::List(name)))
     }
 
-    /// Reports the keys that nobody asked for, and those that should be there. Of a misspelled required key
-    /// only the spelling is reported.
+    /// Reports unknown and missing keys. A misspelled required key is reported only once.
     pub(super) fn finish(&self) {
         let known = self.known.borrow();
         let mut meant = Vec::new();
@@ -205,12 +209,12 @@ impl<'a> Table<'a> {
         for (name, example) in self.missing.borrow().iter().filter(|(name, _)| !meant.contains(name)) {
             let issue = Issue::error(self.span.clone(), format!("{} needs `{name}`", self.title))
                 .label(format!("`{name}` is missing"))
-                .help(format!("add a line such as `{name} = {example}`"));
+                .help(format!("add a line, such as `{name} = {example}`"));
             self.context.report(issue.absence());
         }
     }
 
-    /// The key that is meant by one that nobody asked for. One that is there already is not meant.
+    /// The key that an unknown key probably means. Prefers keys that are not present.
     fn meant(&self, key: &str, known: &[&'static str]) -> Option<&'static str> {
         let absent = |name: &&&'static str| self.entries.get(name).is_none();
         let unavailable = self.unavailable.borrow();
@@ -219,17 +223,17 @@ impl<'a> Table<'a> {
         meant(key, &others).or_else(|| nearest(key, known.iter().copied()))
     }
 
-    /// Whether a table that nobody asks for is meant to be this one.
+    /// Whether a table has a similar name, so it is probably this one misspelled.
     pub(super) fn has_misspelled(&self, name: &'static str) -> bool {
-        let is_table = |value: Value<'_>| matches!(value.item(), Item::Table(_));
+        let is_table = |value: Value<'_>| matches!(value.item(), TomlValue::Table(_));
         let mut others = self.entries.iter().filter(|one| one.key != name && is_table(one.value));
         others.any(|one| nearest(one.key, [name]).is_some())
     }
 
-    fn unknown(&self, key: &str, span: Range<usize>, value: &Item<'_>, near: Option<&str>) -> Issue {
+    fn unknown(&self, key: &str, span: Range<usize>, value: &TomlValue<'_>, near: Option<&str>) -> Issue {
         let shown = shortened(key, 40);
         let message = match self.title {
-            Title::Root if matches!(value, Item::Table(_)) || is_array_of_tables(value) => {
+            Title::Root if matches!(value, TomlValue::Table(_)) || is_array_of_tables(value) => {
                 format!("unknown table `{shown}`")
             }
             Title::Root => format!("unknown key `{shown}` outside of any table"),
@@ -251,6 +255,6 @@ impl<'a> Table<'a> {
     }
 }
 
-fn is_array_of_tables(value: &Item<'_>) -> bool {
-    matches!(value, Item::Array(array) if array.is_of_tables())
+fn is_array_of_tables(value: &TomlValue<'_>) -> bool {
+    matches!(value, TomlValue::Array(array) if array.is_of_tables())
 }

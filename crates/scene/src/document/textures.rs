@@ -10,26 +10,26 @@ use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 use super::limits::Limits;
 use super::names::Names;
-use super::table::Table;
+use super::table::TableReader;
 use crate::math::{Vec2, Vec3};
 
 /// The textures of a file.
-pub(super) struct Textures {
+pub(super) struct TextureList {
     /// Names of the textures.
     pub(super) names: Names,
-    /// In the order of the names; none if one of them is wrong.
+    /// The textures in the order of the names. `None` if one is invalid.
     pub(super) list: Option<Vec<Texture>>,
 }
 
-pub(super) fn read(root: &Table<'_>) -> Textures {
+pub(super) fn read(root: &TableReader<'_>) -> TextureList {
     let tables = root.named_tables("textures");
     let names = Names::new("texture", tables.iter().map(|(name, span, _)| (name.clone(), span.clone())));
     let read: Vec<Option<Texture>> =
         tables.into_iter().map(|(name, _, table)| texture(name, &table?)).collect();
-    Textures { names, list: read.into_iter().collect() }
+    TextureList { names, list: read.into_iter().collect() }
 }
 
-fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
+fn texture(name: String, table: &TableReader<'_>) -> Option<Texture> {
     let (file, image) = image(table);
     let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
@@ -46,8 +46,8 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor })
 }
 
-/// The file, and the number of the image if it is one of glTF.
-fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
+/// Reads the file, and the index of an image in a glTF file.
+fn image(table: &TableReader<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
     if !number.is_given() {
         return (key.file(MAPS), Some(None));
@@ -55,8 +55,8 @@ fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     (key.file(GLTF), number.whole(table.range("image")).map(Some))
 }
 
-/// Reports textures without an encoding that materials use for colours and for numbers. Alpha has no encoding.
-pub(super) fn check_encodings(context: &Context<'_>, textures: &Textures, materials: &[Material]) {
+/// Reports textures without `encoding` that materials use for both colors and numbers. Alpha has no encoding.
+pub(super) fn check_encodings(context: &Context<'_>, textures: &TextureList, materials: &[Material]) {
     let Some(list) = &textures.list else { return };
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
     for (texture, role) in materials.iter().flat_map(Material::textures) {
@@ -70,7 +70,7 @@ pub(super) fn check_encodings(context: &Context<'_>, textures: &Textures, materi
     for texture in (0..list.len()).filter(is_unclear).filter(|&index| list[index].encoding == Encoding::Auto)
     {
         let name = shortened(&list[texture].name, 40);
-        let message = format!("the texture \"{name}\" is used for colours and for numbers");
+        let message = format!("the texture \"{name}\" is used for colors and for numbers");
         let issue = Issue::error(textures.names.span(texture), message)
             .label("it needs `encoding`")
             .help("write `encoding = \"srgb\"` or `\"linear\"`, or take numbers from `channel = \"a\"`");

@@ -1,18 +1,18 @@
-//! Colours as text.
+//! Color strings.
 
 use csscolorparser::NAMED_COLORS;
 
-/// The names of colours, in small letters (CSS Color Module Level 4, 6.1).
+/// The lower-case color names of CSS Color Module Level 4, section 6.1.
 pub fn color_names() -> impl Iterator<Item = &'static str> {
     NAMED_COLORS.keys().map(|name| name.as_str())
 }
 
-/// The sRGB bytes of a colour as a scene writes it: `#rrggbb`, or a name in any case.
+/// Parses a color string, `#rrggbb` or a case-insensitive name, to sRGB bytes.
 pub fn color_bytes(text: &str) -> Option<[u8; 3]> {
     rgb_bytes(text).or_else(|| named(text))
 }
 
-/// The bytes of `#rrggbb`.
+/// Parses `#rrggbb`.
 fn rgb_bytes(text: &str) -> Option<[u8; 3]> {
     let digits = hex_digits(text).filter(|digits| digits.len() == 6)?;
     let number = u32::from_str_radix(digits, 16).ok()?;
@@ -35,7 +35,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_css_in_any_case() {
+    fn color_names_are_case_insensitive() {
         assert_eq!(color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
         assert_eq!(color_bytes("DarkSlateGrey"), color_bytes("darkslategray"));
         assert_eq!(color_names().count(), 148);
@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn only_six_digits_are_a_colour() {
+    fn hex_colors_need_six_digits() {
         assert_eq!(color_bytes("#ff8000"), Some([255, 128, 0]));
         assert_eq!(color_bytes("#FF80aa"), Some([255, 128, 170]));
         for wrong in ["", "#", "ff8000", "#ff800", "#ff80000", "#gg8000", "#+f8000", "#ä1234"] {

@@ -1,20 +1,20 @@
-//! Endings of the files that keys name, without dots and in small letters.
+//! File extensions accepted by keys, in lower case and without dots.
 
-/// Images that can be written.
+/// Image formats that glimt writes.
 pub const IMAGES: &[&str] = &["png", "exr", "ppm", "hdr", "jpg", "jpeg", "webp"];
 
-/// Images that can be read, and then the files that hold numbered images.
+/// Image formats that glimt reads, followed by containers of numbered images.
 const READ: [&str; 14] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "tga", "bmp", "hdr", "exr", "webp", "glb", "gltf"];
 
-/// Images that can be read, and files that hold numbered ones.
+/// Files that may be textures: images and containers of images.
 pub const TEXTURES: &[&str] = &READ;
 
-/// Images that can be read, [`GLTF`] and [`MAPS`] are the two parts of [`TEXTURES`].
+/// Image files, the first part of [`TEXTURES`].
 pub const MAPS: &[&str] = READ.split_at(12).0;
 
-/// Files that hold numbered images and parts.
+/// Containers of numbered images and parts, the rest of [`TEXTURES`].
 pub const GLTF: &[&str] = READ.split_at(12).1;
 
-/// Meshes.
+/// Mesh formats.
 pub const MESHES: &[&str] = &["obj", "off", "ply", "stl", "glb", "gltf"];

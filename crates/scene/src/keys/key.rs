@@ -1,4 +1,4 @@
-//! The definition of a key and of a table.
+//! Definitions of keys and tables.
 
 use super::limits::Limits;
 use crate::choice::Choice;
@@ -8,22 +8,22 @@ use crate::choice::Choice;
 pub struct TableInfo {
     /// Its name in the file.
     pub name: &'static str,
-    /// Its form in the file.
+    /// Its syntax in the file.
     pub form: Form,
     /// Description, one sentence without its full stop.
     pub doc: &'static str,
-    /// The keys that each such table has, whatever its type.
+    /// The keys common to all types.
     pub keys: &'static [KeyInfo],
-    /// The types that the key `type` chooses from, the default first; none if there is no such key.
+    /// The values of the key `type`, default first. Empty if the table has no such key.
     pub types: &'static [TypeInfo],
 }
 
-/// Forms of tables.
+/// Syntax of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// `[name]`, at most once.
     Single,
-    /// `[name.NAME]`, each with a name of its own.
+    /// `[name.NAME]`, one per name.
     Named,
     /// `[[name]]`, a list.
     List,
@@ -36,7 +36,7 @@ pub struct TypeInfo {
     pub name: &'static str,
     /// Description, one sentence without its full stop.
     pub doc: &'static str,
-    /// The keys that only this type has.
+    /// The keys specific to this type.
     pub keys: &'static [KeyInfo],
 }
 
@@ -46,19 +46,19 @@ pub struct KeyInfo {
     /// The key.
     pub name: &'static str,
     /// Accepted values.
-    pub kind: Kind,
-    /// The unit; empty for none.
+    pub kind: ValueKind,
+    /// The unit, or an empty string.
     pub unit: &'static str,
-    /// The value without the key.
+    /// The value if the key is absent.
     pub default: Default,
     /// Description, one sentence without its full stop.
     pub doc: &'static str,
 }
 
-/// Kinds of values.
+/// Type of a key's value.
 #[derive(Clone, Copy, Debug)]
-pub enum Kind {
-    /// A whole number from the first to the second.
+pub enum ValueKind {
+    /// An integer between two bounds, inclusive.
     Whole(u64, u64),
     /// A number.
     Number(Limits),
@@ -68,30 +68,30 @@ pub enum Kind {
     Words(WordList),
     /// Any text.
     Text,
-    /// The path of a file with one of these endings; with none given, of any file.
+    /// The path of a file with one of these extensions; any file if empty.
     File(&'static [&'static str]),
-    /// A colour; the limits hold for each component.
+    /// A color; the limits apply to each component.
     Color(Limits),
-    /// A colour or a texture.
+    /// A color or a texture.
     ColorOrTexture(Limits),
-    /// A colour, or a texture with a scale.
+    /// A color, or a texture with a scale.
     Emission(Limits),
     /// A number or a texture.
     NumberOrTexture(Limits),
-    /// An array of so many numbers, with the name of the whole.
+    /// An array of this many numbers, and the name of such a value.
     Numbers(usize, &'static str, Limits),
-    /// A number or three.
+    /// A number or an array of three numbers.
     Scale(Limits),
     /// The name of a texture.
     Texture,
-    /// The name of a texture of numbers, or that with a channel.
+    /// The name of a height map, optionally with a channel.
     Heights,
     /// The name of a material.
     Material,
 }
 
-impl Kind {
-    /// The table that gives the value its name. `None` if the value is no name.
+impl ValueKind {
+    /// The table that defines the name. `None` if the value is not a name.
     pub fn named_in(self) -> Option<&'static str> {
         match self {
             Self::Material => Some("materials"),
@@ -112,7 +112,7 @@ impl Kind {
     }
 }
 
-/// The words of a choice, in the order in which they are offered.
+/// Returns the words of a choice, in display order.
 pub type WordList = fn() -> Vec<Word>;
 
 /// A word of a choice.
@@ -129,26 +129,26 @@ pub fn words<C: Choice>() -> Vec<Word> {
     C::ALL.iter().map(|one| Word { name: one.name(), meaning: one.meaning() }).collect()
 }
 
-/// Values of keys that are not given.
+/// Default of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Default {
-    /// The key must be given, for example with this value.
+    /// The key is required. An example value.
     Required(&'static str),
-    /// This value, as a scene file has it.
+    /// This value, in scene file syntax.
     Is(&'static str),
-    /// A value that depends on others, in words.
+    /// Description of a value that depends on other keys.
     By(&'static str),
-    /// None.
+    /// No value.
     Absent,
 }
 
-/// The greatest whole number of keys that count without a limit of their own.
+/// Upper bound of integer keys without a specific limit.
 pub(super) const MOST_WHOLE: u64 = u32::MAX as u64;
 
-/// A key: name, values, unit, default, description.
+/// Defines a key.
 pub(super) const fn key(
     name: &'static str,
-    kind: Kind,
+    kind: ValueKind,
     unit: &'static str,
     default: Default,
     doc: &'static str,
@@ -157,7 +157,7 @@ pub(super) const fn key(
 }
 
 impl TableInfo {
-    /// The type of this name; of no name, the default. `None` if the table has no such type.
+    /// The type called `name`, or the default type. `None` if there is no such type.
     pub fn type_of(&self, name: Option<&str>) -> Option<&'static TypeInfo> {
         match name {
             Some(name) => self.types.iter().find(|one| one.name == name),
@@ -165,12 +165,12 @@ impl TableInfo {
         }
     }
 
-    /// All keys of the table with this type, but for `type`: first those of the type.
+    /// All keys of the table with this type, starting with the type's own. Excludes `type`.
     pub fn keys_of(&self, kind: Option<&'static TypeInfo>) -> impl Iterator<Item = &'static KeyInfo> {
         kind.map_or(&[] as &[KeyInfo], |kind| kind.keys).iter().chain(self.keys)
     }
 
-    /// The head of the table in a file, as in `[materials.NAME]`.
+    /// The table header, such as `[materials.NAME]`.
     pub fn head(&self) -> String {
         match self.form {
             Form::Single => format!("[{}]", self.name),
@@ -181,7 +181,7 @@ impl TableInfo {
 }
 
 impl KeyInfo {
-    /// The value to write for the key: the default, or an example.
+    /// The default value, or an example.
     pub fn example(&self) -> String {
         match (self.default, self.kind) {
             (Default::Required(value) | Default::Is(value), _) => value.to_owned(),
@@ -189,17 +189,17 @@ impl KeyInfo {
         }
     }
 
-    /// The range in words, as in `0 … 1`; empty if the kind says it all.
+    /// The range, such as `0 … 1`. Empty if the type implies it.
     pub fn range(&self) -> String {
         self.kind.range()
     }
 
-    /// The kind in words, as in `colour or texture`.
+    /// The name of the type, such as `color or texture`.
     pub fn kind(&self) -> String {
         self.kind.words()
     }
 
-    /// The default in words and code, as a page has it.
+    /// The default in Markdown, as in the documentation.
     pub fn default_words(&self) -> String {
         match self.default {
             Default::Required(_) => "*required*".to_owned(),
@@ -210,8 +210,8 @@ impl KeyInfo {
     }
 }
 
-impl Kind {
-    /// A value of the kind.
+impl ValueKind {
+    /// An example value.
     fn example(self) -> String {
         match self {
             Self::Whole(least, _) => least.to_string(),
@@ -222,7 +222,7 @@ impl Kind {
             Self::Text | Self::Texture | Self::Heights | Self::Material => "\"name\"".to_owned(),
             Self::File(endings) => format!("\"file.{}\"", endings.first().copied().unwrap_or("txt")),
             Self::Color(_) | Self::ColorOrTexture(_) | Self::Emission(_) => "[0.5, 0.5, 0.5]".to_owned(),
-            // A matrix has rows of four; that of no change has ones from corner to corner.
+            // The identity matrix.
             Self::Numbers(16, ..) => {
                 let number = |i: usize| if i.is_multiple_of(5) { "1" } else { "0" };
                 format!("[{}]", (0..16).map(number).collect::<Vec<_>>().join(", "))
@@ -241,9 +241,9 @@ impl Kind {
             }
             Self::Text => "text".to_owned(),
             Self::File(_) => "file".to_owned(),
-            Self::Color(_) => "colour".to_owned(),
-            Self::ColorOrTexture(_) => "colour or texture".to_owned(),
-            Self::Emission(_) => "colour or `{ texture = \"NAME\", scale = 1.0 }`".to_owned(),
+            Self::Color(_) => "color".to_owned(),
+            Self::ColorOrTexture(_) => "color or texture".to_owned(),
+            Self::Emission(_) => "color or `{ texture = \"NAME\", scale = 1.0 }`".to_owned(),
             Self::NumberOrTexture(_) => "number or texture".to_owned(),
             Self::Numbers(_, words, _) => words.to_owned(),
             Self::Scale(_) => "number or three numbers".to_owned(),

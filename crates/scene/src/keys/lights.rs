@@ -1,7 +1,7 @@
 //! `[[light]]`.
 
 use super::key::Default::Is;
-use super::key::Kind::{Color, Number, Numbers, Words};
+use super::key::ValueKind::{Color, Number, Numbers, Words};
 use super::key::{Form, TableInfo, TypeInfo, key, words};
 use super::limits::Limits::{Any, AtLeast, Between, Inside};
 use crate::description::light::Falloff;
@@ -14,9 +14,9 @@ pub(super) const LIGHT: TableInfo = TableInfo {
     types: &[
         TypeInfo {
             name: "point",
-            doc: "A light without extent",
+            doc: "A point light",
             keys: &[
-                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Its place"),
+                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
                 key(
                     "intensity",
                     Color(AtLeast(0.0)),
@@ -29,15 +29,15 @@ pub(super) const LIGHT: TableInfo = TableInfo {
                     Words(words::<Falloff>),
                     "",
                     Is("\"square\""),
-                    "`\"square\"`: with the square of the distance, as in nature; `\"none\"`: `intensity` is the irradiance at normal incidence, at any distance",
+                    "`\"square\"`: inverse-square falloff, physically correct; `\"none\"`: `intensity` is the irradiance at normal incidence, at any distance",
                 ),
             ],
         },
         TypeInfo {
             name: "spot",
-            doc: "A light without extent that shines into a cone",
+            doc: "A point light that shines into a cone",
             keys: &[
-                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Its place"),
+                key("position", Numbers(3, "point", Any), "length", Is("[0, 3, 0]"), "Position"),
                 key("look_at", Numbers(3, "point", Any), "length", Is("[0, 0, 0]"), "A point on its axis"),
                 key(
                     "intensity",
@@ -46,27 +46,27 @@ pub(super) const LIGHT: TableInfo = TableInfo {
                     Is("[10, 10, 10]"),
                     "Radiant intensity on the axis",
                 ),
-                key("angle", Number(Inside(0.0, 360.0)), "degrees", Is("45"), "The whole cone"),
+                key("angle", Number(Inside(0.0, 360.0)), "degrees", Is("45"), "Full apex angle of the cone"),
                 key(
                     "blend",
                     Number(Between(0.0, 1.0)),
-                    "part of the half angle",
+                    "fraction of the half angle",
                     Is("0.2"),
-                    "The outer part of the cone over which the light fades",
+                    "Outer part of the cone where the light fades out",
                 ),
                 key("falloff", Words(words::<Falloff>), "", Is("\"square\""), "As for a point light"),
             ],
         },
         TypeInfo {
             name: "directional",
-            doc: "Light from far away, as of the sun",
+            doc: "Light from a distant source, such as the sun",
             keys: &[
                 key(
                     "direction",
                     Numbers(3, "direction", Any),
                     "",
                     Is("[0, -1, 0]"),
-                    "The way that light travels",
+                    "Direction in which the light travels",
                 ),
                 key(
                     "irradiance",
@@ -80,7 +80,7 @@ pub(super) const LIGHT: TableInfo = TableInfo {
                     Number(Between(0.0, 180.0)),
                     "degrees",
                     Is("0"),
-                    "Apparent diameter, 0 or at least 0.001; the sun has 0.53. Above 0 shadows are soft and the disc is seen",
+                    "Apparent diameter, 0 or at least 0.001; the sun has 0.53. Above 0, shadows are soft and the disk is visible",
                 ),
             ],
         },

@@ -1,29 +1,28 @@
-//! Ranges of numbers, and the words for them.
+//! Ranges of numbers, with their descriptions.
 
 use crate::math::limits::{LARGEST, is_too_short};
 
-/// Numbers that a key accepts. All are finite and of magnitude at most [`LARGEST`]
-/// besides.
+/// Range of accepted numbers. All numbers must also be finite and at most [`LARGEST`] in magnitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limits {
     /// Any number.
     Any,
     /// Any number but 0.
     NotZero,
-    /// From here on.
+    /// At least this number.
     AtLeast(f64),
-    /// A length or size: > 0, and not so small that its square is nothing.
+    /// A length or size: positive, and large enough that its square does not underflow.
     Length,
-    /// The same, or 0.
+    /// A [`Length`](Self::Length) or 0.
     LengthOrZero,
-    /// Both ends included.
+    /// Inclusive bounds.
     Between(f64, f64),
-    /// Both ends excluded.
+    /// Exclusive bounds.
     Inside(f64, f64),
 }
 
 impl Limits {
-    /// The fault of a number, to be read after its name: `must be greater than 0`.
+    /// Describes why a number is out of range, such as `must be greater than 0`.
     pub fn violation(self, number: f64) -> Option<String> {
         if number.is_nan() || number.is_infinite() {
             return Some("must be a finite number".to_owned());
@@ -53,7 +52,7 @@ impl Limits {
         }
     }
 
-    /// The range in words, as the pages have it.
+    /// The range as shown in the documentation.
     pub fn range(self) -> String {
         match self {
             Self::Any => "any".to_owned(),
@@ -84,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ends_belong_where_the_words_say() {
+    fn bounds_match_their_descriptions() {
         let ok = |limits: Limits, number| limits.violation(number).is_none();
         assert!(ok(Limits::Any, -0.0) && ok(Limits::AtLeast(0.0), -0.0));
         assert!(!ok(Limits::Length, 0.0) && ok(Limits::Length, 1e-9) && !ok(Limits::Length, 1e-30));

@@ -1,6 +1,6 @@
-//! The one definition of the keys of a scene file: names, values, units, defaults, descriptions. The reader takes its words and
-//! ranges from here; colours and vectors outside of materials have the ranges of their types. A test compares these, and the
-//! defaults, with the reader. The schema, `glimt explain`, completions and the pages are made from the definition or compared with it.
+//! Definitions of all scene keys: names, types, units, ranges, defaults and descriptions. The reader takes ranges from here,
+//! except for colors and vectors outside of materials; a test compares ranges and defaults with the reader. The schema,
+//! `glimt explain` and completions are generated from the definitions, and the documentation is compared with them.
 
 mod colors;
 pub mod endings;
@@ -17,9 +17,9 @@ use std::sync::LazyLock;
 
 pub(super) use colors::hex_digits;
 pub use colors::{color_bytes, color_names};
-pub use key::{Default, Form, KeyInfo, Kind, TableInfo, TypeInfo, Word, WordList, words};
+pub use key::{Default, Form, KeyInfo, TableInfo, TypeInfo, ValueKind, Word, WordList, words};
 
-/// All tables, in the order in which the pages have them.
+/// All tables, in the order of the documentation.
 pub fn tables() -> &'static [TableInfo] {
     static TABLES: LazyLock<Vec<TableInfo>> = LazyLock::new(|| {
         let before = [render::table(), singles::CAMERA, singles::PHOTONS];
@@ -59,8 +59,8 @@ mod tests {
     use crate::diagnostic::Severity;
     use crate::parse;
 
-    /// Keys that a table needs beside a key, with values.
-    fn beside(table: &str, kind: &str, key: &str) -> Vec<(String, String)> {
+    /// Other keys that a table needs in addition to `key`, with values.
+    fn other_keys(table: &str, kind: &str, key: &str) -> Vec<(String, String)> {
         let fixed: &[(&str, &str)] = match (table, kind, key) {
             ("materials", "metal", "color" | "element") => &[],
             ("materials", "metal", "eta") => &[("k", "[3, 2, 1]")],
@@ -84,7 +84,7 @@ mod tests {
         fixed.into_iter().filter(|(name, _)| name != key).chain(required).collect()
     }
 
-    /// A scene with a key's example.
+    /// A scene that sets a key to its example value.
     fn with_example(info: &TableInfo, kind: Option<&TypeInfo>, key: &KeyInfo) -> String {
         let mut text = String::new();
         for (table, body) in [
@@ -100,7 +100,7 @@ mod tests {
             text.push_str(&format!("\ntype = \"{}\"", kind.name));
         }
         text.push_str(&format!("\n{} = {}\n", key.name, key.example()));
-        for (name, value) in beside(info.name, kind.map_or("", |kind| kind.name), key.name) {
+        for (name, value) in other_keys(info.name, kind.map_or("", |kind| kind.name), key.name) {
             text.push_str(&format!("{name} = {value}\n"));
         }
         text
@@ -116,7 +116,7 @@ mod tests {
             };
             for kind in kinds {
                 for key in info.keys_of(kind) {
-                    // A glass that fills its shape is there everywhere.
+                    // Solid glass has no opacity.
                     let is_glass = kind.is_some_and(|kind| kind.name == "glass");
                     if is_glass && key.name.starts_with("opacity") {
                         continue;

@@ -1,39 +1,47 @@
-//! `[render]`, from the definition of its settings.
+//! `[render]`, derived from `render_keys!`.
 
 use std::sync::LazyLock;
 
 use super::endings::IMAGES;
-use super::key::{Default, Form, KeyInfo, Kind, TableInfo, key};
+use super::key::{Default, Form, KeyInfo, TableInfo, ValueKind, key};
 use super::limits::Limits;
 use crate::description::{KeyRange, Render, RenderKey};
 use crate::math::limits::LARGEST;
 
-/// The keys, made once.
+/// The keys, created on first use.
 static KEYS: LazyLock<Vec<KeyInfo>> = LazyLock::new(|| {
     let output = key(
         "output",
-        Kind::File(IMAGES),
+        ValueKind::File(IMAGES),
         "",
         Default::By("the scene's name with `.png`"),
-        "The image; the ending chooses the format",
+        "The image file; the extension chooses the format",
     );
     Render::keys().into_iter().map(info).chain([output]).collect()
 });
 
 /// The table.
 pub(super) fn table() -> TableInfo {
-    TableInfo { name: "render", form: Form::Single, doc: "The picture", keys: &KEYS, types: &[] }
+    TableInfo {
+        name: "render",
+        form: Form::Single,
+        doc: "Image and render settings",
+        keys: &KEYS,
+        types: &[],
+    }
 }
 
 fn info(key: RenderKey) -> KeyInfo {
     let RenderKey { name, doc, unit, range, words, default, has_option: _ } = key;
     let kind = match range {
-        KeyRange::Whole(range) => Kind::Whole((*range.start()).into(), (*range.end()).into()),
-        KeyRange::Number(range) if *range.end() >= LARGEST => Kind::Number(Limits::AtLeast(*range.start())),
-        KeyRange::Number(range) => Kind::Number(Limits::Between(*range.start(), *range.end())),
-        KeyRange::Names(_) => Kind::Words(words),
-        KeyRange::Color => Kind::Color(Limits::AtLeast(0.0)),
+        KeyRange::Whole(range) => ValueKind::Whole((*range.start()).into(), (*range.end()).into()),
+        KeyRange::Number(range) if *range.end() >= LARGEST => {
+            ValueKind::Number(Limits::AtLeast(*range.start()))
+        }
+        KeyRange::Number(range) => ValueKind::Number(Limits::Between(*range.start(), *range.end())),
+        KeyRange::Names(_) => ValueKind::Words(words),
+        KeyRange::Color => ValueKind::Color(Limits::AtLeast(0.0)),
     };
-    // The list of keys lives as long as the program.
+    // Leaking is fine: the list is created once.
     KeyInfo { name, kind, unit, default: Default::Is(default.leak()), doc }
 }

@@ -1,4 +1,4 @@
-//! The same report as lines of coloured pieces, for a pane of a terminal UI.
+//! Reports as styled lines, for the terminal UI.
 
 use annotate_snippets::Renderer;
 use anstyle::{AnsiColor, Effects};
@@ -7,18 +7,18 @@ use super::super::diagnostic::Diagnostic;
 use super::render_with;
 
 /// A line of a report.
-pub type Line = Vec<Piece>;
+pub type ReportLine = Vec<Piece>;
 
 /// A run of text of one role.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// Its role.
+    /// Determines the color.
     pub role: Role,
-    /// Without control characters.
+    /// The text, without control characters.
     pub text: String,
 }
 
-/// Role of a piece of a report, so that each front end gives it its own colour.
+/// Role of a piece of a report. Front ends choose the color.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Source text, paths.
@@ -33,8 +33,8 @@ pub enum Role {
     Message,
 }
 
-/// The report of [`super::render`] line by line.
-pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
+/// Returns the report of [`super::render`] as styled lines.
+pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<ReportLine> {
     let renderer = Renderer::plain()
         .error(AnsiColor::Red.on_default())
         .warning(AnsiColor::Yellow.on_default())
@@ -43,9 +43,9 @@ pub fn lines(diagnostics: &[Diagnostic], width: usize) -> Vec<Line> {
     render_with(diagnostics, width, &renderer).lines().map(pieces).collect()
 }
 
-/// Splits a line at its colour sequences. Those are the renderer's own: text from files has none.
-fn pieces(line: &str) -> Line {
-    let mut pieces = Line::new();
+/// Splits a line at its color escape sequences, which all come from the renderer: text from files has none.
+fn pieces(line: &str) -> ReportLine {
+    let mut pieces = ReportLine::new();
     let mut role = Role::Text;
     for (number, part) in line.split("\u{1b}[").enumerate() {
         let text = match part.split_once('m') {
@@ -62,7 +62,7 @@ fn pieces(line: &str) -> Line {
     pieces
 }
 
-/// The role whose colour in [`lines`] has this code.
+/// The role with this color code in [`lines`].
 fn role_of(codes: &str) -> Role {
     match codes {
         "31" => Role::Error,

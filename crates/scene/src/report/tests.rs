@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use super::super::diagnostic::Place;
+use super::super::diagnostic::SourceSpan;
 use super::*;
 
 fn at(source: &Arc<str>, span: Range<usize>, label: &str) -> Diagnostic {
@@ -8,13 +8,13 @@ fn at(source: &Arc<str>, span: Range<usize>, label: &str) -> Diagnostic {
         severity: Severity::Error,
         message: "`radius` must be greater than 0".to_owned(),
         path: PathBuf::from("a.toml"),
-        place: Some(Place { source: Arc::clone(source), span, label: label.to_owned() }),
-        help: Some("say how large it is".to_owned()),
+        place: Some(SourceSpan { source: Arc::clone(source), span, label: label.to_owned() }),
+        help: Some("use a positive radius".to_owned()),
     }
 }
 
 #[test]
-fn shows_file_line_column_source_label_and_help() {
+fn report_has_position_source_label_and_help() {
     let source: Arc<str> = "# äöü\n[[sphere]]\nradius = -0.5\n".into();
     let text = render(&[at(&source, 27..31, "found -0.5")], 80, Style::Plain);
     let expected = "\
@@ -24,7 +24,7 @@ error: `radius` must be greater than 0
 3 | radius = -0.5
   |        ^^^^ found -0.5
   |
-  = help: say how large it is
+  = help: use a positive radius
 
 1 error
 ";
@@ -32,7 +32,7 @@ error: `radius` must be greater than 0
 }
 
 #[test]
-fn columns_count_characters_and_survive_tabs_and_escapes() {
+fn columns_count_characters() {
     let source: Arc<str> = "\tmö\u{1b}[31m = \"木\u{202e}\" nix\r\n".into();
     let start = source.find("nix").expect("there");
     let text = render(&[at(&source, start..start + 3, "here")], 80, Style::Plain);
@@ -48,7 +48,7 @@ fn columns_count_characters_and_survive_tabs_and_escapes() {
 }
 
 #[test]
-fn a_place_without_words_has_no_note() {
+fn empty_labels_make_no_note() {
     let source: Arc<str> = format!("{}a", "[".repeat(100)).into();
     let text = render(&[at(&source, 100..101, "")], 60, Style::Plain);
     assert!(!text.contains("note"), "{text}");
@@ -57,7 +57,7 @@ fn a_place_without_words_has_no_note() {
 }
 
 #[test]
-fn sorts_by_place_and_counts() {
+fn diagnostics_are_sorted_and_counted() {
     let source: Arc<str> = "a = 1\nb = 2\n".into();
     let mut warning = at(&source, 0..1, "first");
     warning.severity = Severity::Warning;
@@ -68,7 +68,7 @@ fn sorts_by_place_and_counts() {
 }
 
 #[test]
-fn a_line_of_megabytes_is_cut_at_the_width() {
+fn huge_lines_are_cut_at_the_width() {
     let source: Arc<str> = format!("{} = oops{}", "x".repeat(3_000_000), " y".repeat(1_000_000)).into();
     let text = render(&[at(&source, 3_000_003..3_000_007, "here")], 60, Style::Plain);
     assert!(text.contains("a.toml:1:3000004\n"), "{text}");
@@ -77,7 +77,7 @@ fn a_line_of_megabytes_is_cut_at_the_width() {
 }
 
 #[test]
-fn ends_of_texts_and_places_over_several_lines_are_underlined() {
+fn multiline_and_empty_spans_are_underlined() {
     let source: Arc<str> = "a = [\n 1,\n]".into();
     assert!(render(&[at(&source, 4..11, "here")], 80, Style::Plain).contains("a.toml:1:5\n"));
     assert!(render(&[at(&source, 11..11, "here")], 80, Style::Plain).contains("a.toml:3:2\n"));
@@ -99,7 +99,7 @@ fn long_messages_are_wrapped() {
 }
 
 #[test]
-fn lines_have_the_text_of_the_plain_report_and_roles() {
+fn lines_match_the_plain_report() {
     let source: Arc<str> = "radius = -0.5 # \u{1b}[31m\n".into();
     let diagnostics = [at(&source, 9..13, "found -0.5")];
     let lines = lines(&diagnostics, 80);
@@ -123,14 +123,13 @@ fn labels_are_never_cut() {
     let one = at(&source, 13..22, label);
     for width in [30, 59, 60, 61, 80, 106, 107, 108, 200] {
         let text = render(std::slice::from_ref(&one), width, Style::Plain);
-        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
         let rows: Vec<&str> = text.lines().collect();
         assert!(rows.iter().all(|row| row.chars().count() <= width), "{width}:\n{text}");
-        let said = words(&text).join(" ");
-        assert!(said.contains(label), "{width}:\n{text}");
-        assert!(said.contains("^^^^^^^^^"), "{width}:\n{text}");
+        let unwrapped = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(unwrapped.contains(label), "{width}:\n{text}");
+        assert!(unwrapped.contains("^^^^^^^^^"), "{width}:\n{text}");
     }
-    // Where it fits it stands behind the carets.
+    // A label that fits follows the carets.
     assert!(render(std::slice::from_ref(&one), 200, Style::Plain).contains("^^^^^^^^^ `u` and"));
     assert!(
         lines(std::slice::from_ref(&one), 60)
@@ -140,7 +139,7 @@ fn labels_are_never_cut() {
 }
 
 #[test]
-fn a_locator_finds_places_of_several_texts() {
+fn locator_handles_several_texts() {
     let texts: [Arc<str>; 2] = ["a\nbä\n\nc".into(), "\u{feff}x\r\ny".into()];
     let mut locator = Locator::default();
     for round in 0..2 {

@@ -1,49 +1,48 @@
-//! Headers, keys and values become tables, by the rules of TOML: what a header or a dotted key may add to, and what is
-//! defined twice.
+//! Builds tables from headers, keys and values. Enforces TOML's rules for extending tables and for duplicate definitions.
 
 use std::borrow::Cow;
 
 use toml_parser::{ErrorSink, ParseError};
 
 use super::error::{Errors, SyntaxError};
-use super::tree::{Document, Kind, Name, Node, Origin, Span, TableId, Text};
+use super::tree::{Document, Name, NodeKind, Span, StringRef, TableId, TableOrigin, ValueNode};
 
 /// `[path.key]` or `[[path.key]]`.
 #[derive(Clone, Debug)]
-pub(super) struct Header<'s> {
+pub(super) struct TableHeader<'s> {
     pub(super) path: Vec<Name<'s>>,
-    /// None: it cannot be used, and neither can the keys below it.
+    /// `None` if the header is unusable, and with it the keys below.
     pub(super) key: Option<Name<'s>>,
-    /// With its brackets.
+    /// Includes the brackets.
     pub(super) span: Span,
-    /// Whether the brackets are double.
+    /// Whether it has double brackets.
     pub(super) is_list: bool,
 }
 
-/// A document that grows.
+/// A document under construction.
 pub(super) struct Assembly<'s> {
     pub(super) document: Document<'s>,
-    /// Table that keys go to.
+    /// The current table.
     table: TableId,
-    /// Header of `table`, which is put in its place when the next one begins. `None` if `table` is the root.
-    header: Option<Header<'s>>,
-    /// A header whose end was not found yet: what follows is searched for it.
-    pub(super) open: Option<Header<'s>>,
-    /// After a key without a value nothing is understood any more.
+    /// The header of `table`, which is inserted when the next one begins. `None` if `table` is the root.
+    header: Option<TableHeader<'s>>,
+    /// An unclosed header: the following expressions may close it.
+    pub(super) open: Option<TableHeader<'s>>,
+    /// Set after a key without a value: the rest of the document is ignored.
     pub(super) is_lost: bool,
     pub(super) syntax: Errors,
     pub(super) meaning: Errors,
-    /// Elements of arrays that are being read.
-    pub(super) elements: Vec<Node>,
+    /// Stack of elements of the arrays being read.
+    pub(super) elements: Vec<ValueNode>,
 }
 
-/// Reports errors of a part of the text that begins at byte `base`.
-pub(super) struct Sink<'a> {
+/// Collects parser errors for the part of the text that starts at byte `base`.
+pub(super) struct ErrorCollector<'a> {
     pub(super) errors: &'a mut Errors,
     pub(super) base: usize,
 }
 
-impl ErrorSink for Sink<'_> {
+impl ErrorSink for ErrorCollector<'_> {
     fn report_error(&mut self, error: ParseError) {
         self.errors.push_with(|| SyntaxError::new(&error, self.base));
     }
@@ -54,9 +53,9 @@ impl<'s> Assembly<'s> {
         Self::of(Document::new(source))
     }
 
-    /// Goes on with a document, in a table that is in no other.
-    pub(super) fn apart(mut document: Document<'s>) -> (Self, TableId) {
-        let table = document.add_table(Origin::default());
+    /// Continues a document in a new, detached table.
+    pub(super) fn detached(mut document: Document<'s>) -> (Self, TableId) {
+        let table = document.add_table(TableOrigin::default());
         (Self { table, ..Self::of(document) }, table)
     }
 
@@ -73,12 +72,12 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// Whether the text now belongs to a header that was not closed.
+    /// Whether a header is unclosed.
     pub(super) fn is_in_header(&self) -> bool {
         self.open.is_some()
     }
 
-    /// The document is at its end.
+    /// Completes the document at the end of the text.
     pub(super) fn finish(mut self) -> (Document<'s>, Vec<SyntaxError>) {
         if let Some(header) = self.open.take() {
             self.start_table(header);
@@ -87,13 +86,13 @@ impl<'s> Assembly<'s> {
         (self.document, self.syntax.then(self.meaning))
     }
 
-    /// The value of something at `span` is a text.
-    pub(super) fn text(&mut self, span: Span, text: Cow<'s, str>) -> Text {
+    /// Stores the decoded string at `span`.
+    pub(super) fn text(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
         self.document.add_text(span, text)
     }
 
-    /// The elements from the given one on become an array.
-    pub(super) fn end_array(&mut self, first: usize) -> Kind {
+    /// Makes an array of the elements from `first` on.
+    pub(super) fn end_array(&mut self, first: usize) -> NodeKind {
         let kind = self.document.add_array(&self.elements[first..]);
         self.elements.truncate(first);
         kind
@@ -107,8 +106,8 @@ impl<'s> Assembly<'s> {
         self.error(span, "duplicate key");
     }
 
-    /// `path.key = value` below a header.
-    pub(super) fn key_value(&mut self, path: &[Name<'s>], key: Name<'s>, value: Node) {
+    /// Adds `path.key = value` to the current table.
+    pub(super) fn key_value(&mut self, path: &[Name<'s>], key: Name<'s>, value: ValueNode) {
         let is_dotted = !path.is_empty();
         let Some(parent) = self.descend(self.table, path, is_dotted) else { return };
         let adds_to_defined = is_dotted && !self.document.origin(parent).is_implicit;
@@ -119,8 +118,14 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// `path.key = value` within the braces of `table`.
-    pub(super) fn inline_key_value(&mut self, table: TableId, path: &[Name<'s>], key: Name<'s>, value: Node) {
+    /// Adds `path.key = value` to the inline table `table`.
+    pub(super) fn inline_key_value(
+        &mut self,
+        table: TableId,
+        path: &[Name<'s>],
+        key: Name<'s>,
+        value: ValueNode,
+    ) {
         let Some(parent) = self.descend_inline(table, path) else { return };
         let adds_to_defined = self.document.origin(parent).is_dotted == path.is_empty();
         if adds_to_defined || self.document.find(parent, &key.text).is_some() {
@@ -130,24 +135,25 @@ impl<'s> Assembly<'s> {
         }
     }
 
-    /// A header begins a table. One that longer headers made already is defined by this; one that stood there before
-    /// is an error, and is continued.
-    pub(super) fn start_table(&mut self, header: Header<'s>) {
-        self.table = self.continued(&header).unwrap_or_else(|| self.document.add_table(Origin::default()));
+    /// Starts the table of a header. Defines a table that longer headers created implicitly; reports a table that is already
+    /// defined, but continues it.
+    pub(super) fn start_table(&mut self, header: TableHeader<'s>) {
+        self.table =
+            self.continued(&header).unwrap_or_else(|| self.document.add_table(TableOrigin::default()));
         let is_inline = self.document.origin(self.table).is_inline;
-        self.document.set_origin(self.table, Origin { is_inline, ..Origin::default() });
+        self.document.set_origin(self.table, TableOrigin { is_inline, ..TableOrigin::default() });
         self.header = Some(header);
     }
 
-    /// The table that a header names a second time, taken out of its place.
-    fn continued(&mut self, header: &Header<'s>) -> Option<TableId> {
+    /// Removes and returns the existing table of a header, if there is one.
+    fn continued(&mut self, header: &TableHeader<'s>) -> Option<TableId> {
         if header.is_list {
             return None;
         }
         let parent = self.descend(Document::ROOT, &header.path, false)?;
         let key = header.key.as_ref()?;
         let old = self.document.remove(parent, &key.text)?;
-        let table = if let Kind::Table(table) = old.kind { Some(table) } else { None };
+        let table = if let NodeKind::Table(table) = old.kind { Some(table) } else { None };
         let origin = table.map(|table| self.document.origin(table));
         if !origin.is_some_and(|origin| origin.is_implicit && !origin.is_dotted) {
             self.duplicate(key.span);
@@ -155,10 +161,10 @@ impl<'s> Assembly<'s> {
         table
     }
 
-    /// Puts the table that ends here in its place.
+    /// Inserts the current table under its header.
     pub(super) fn finish_table(&mut self) {
-        let Some(Header { path, key, span, is_list }) = self.header.take() else { return };
-        let node = Node { span, kind: Kind::Table(self.table) };
+        let Some(TableHeader { path, key, span, is_list }) = self.header.take() else { return };
+        let node = ValueNode { span, kind: NodeKind::Table(self.table) };
         let Some(key) = key else { return };
         let Some(parent) = self.descend(Document::ROOT, &path, false) else { return };
         if !is_list {
@@ -166,37 +172,37 @@ impl<'s> Assembly<'s> {
             return;
         }
         match self.document.find(parent, &key.text).map(|found| found.kind) {
-            Some(Kind::List(list)) => self.document.list_mut(list).push(node),
+            Some(NodeKind::List(list)) => self.document.list_mut(list).push(node),
             Some(_) => self.duplicate(key.span),
             None => {
                 let list = self.document.add_list();
-                self.document.add_entry(parent, key, Node { span, kind: list });
-                if let Kind::List(list) = list {
+                self.document.add_entry(parent, key, ValueNode { span, kind: list });
+                if let NodeKind::List(list) = list {
                     self.document.list_mut(list).push(node);
                 }
             }
         }
     }
 
-    /// The table that a path leads to; makes it if it does not exist.
+    /// Returns the table at `path`, creating missing ones.
     fn descend(&mut self, from: TableId, path: &[Name<'s>], is_dotted: bool) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
-                let origin = Origin { is_implicit: true, is_dotted, is_inline: false };
+                let origin = TableOrigin { is_implicit: true, is_dotted, is_inline: false };
                 return Some(self.implicit_table(table, name, origin));
             };
             match found.kind {
-                Kind::Table(inner) => self.enter(inner, name, is_dotted),
-                Kind::List(list) => {
+                NodeKind::Table(inner) => self.enter(inner, name, is_dotted),
+                NodeKind::List(list) => {
                     let last = self.document.list_mut(list).last()?.kind;
-                    if let Kind::Table(last) = last { Some(last) } else { None }
+                    if let NodeKind::Table(last) = last { Some(last) } else { None }
                 }
                 other => self.cannot_extend(name, other),
             }
         })
     }
 
-    /// Whether a header or dotted key may go through this table.
+    /// Returns the table if a header or dotted key may add to it.
     fn enter(&mut self, table: TableId, name: &Name<'s>, is_dotted: bool) -> Option<TableId> {
         let origin = self.document.origin(table);
         if origin.is_inline {
@@ -208,21 +214,21 @@ impl<'s> Assembly<'s> {
             return None;
         }
         if is_dotted {
-            self.document.set_origin(table, Origin { is_dotted, ..origin });
+            self.document.set_origin(table, TableOrigin { is_dotted, ..origin });
         }
         Some(table)
     }
 
-    /// The same within braces.
+    /// Like [`Self::descend`], within an inline table.
     fn descend_inline(&mut self, from: TableId, path: &[Name<'s>]) -> Option<TableId> {
         path.iter().try_fold(from, |table, name| {
             let Some(found) = self.document.find(table, &name.text) else {
-                let origin = Origin { is_implicit: true, is_dotted: true, is_inline: true };
+                let origin = TableOrigin { is_implicit: true, is_dotted: true, is_inline: true };
                 return Some(self.implicit_table(table, name, origin));
             };
             match found.kind {
-                Kind::Table(inner) if self.document.origin(inner).is_implicit => Some(inner),
-                Kind::Table(_) => {
+                NodeKind::Table(inner) if self.document.origin(inner).is_implicit => Some(inner),
+                NodeKind::Table(_) => {
                     self.duplicate(name.span);
                     None
                 }
@@ -231,21 +237,25 @@ impl<'s> Assembly<'s> {
         })
     }
 
-    fn implicit_table(&mut self, parent: TableId, name: &Name<'s>, origin: Origin) -> TableId {
+    fn implicit_table(&mut self, parent: TableId, name: &Name<'s>, origin: TableOrigin) -> TableId {
         let table = self.document.add_table(origin);
-        self.document.add_entry(parent, name.clone(), Node { span: name.span, kind: Kind::Table(table) });
+        self.document.add_entry(
+            parent,
+            name.clone(),
+            ValueNode { span: name.span, kind: NodeKind::Table(table) },
+        );
         table
     }
 
-    fn cannot_extend(&mut self, name: &Name<'s>, kind: Kind) -> Option<TableId> {
+    fn cannot_extend(&mut self, name: &Name<'s>, kind: NodeKind) -> Option<TableId> {
         let what = match kind {
-            Kind::String(_) => "string",
-            Kind::Integer(..) => "integer",
-            Kind::Float(_) => "float",
-            Kind::Boolean(_) => "boolean",
-            Kind::Datetime => "datetime",
-            Kind::Array(_) | Kind::List(_) => "array",
-            Kind::Table(_) => "table",
+            NodeKind::String(_) => "string",
+            NodeKind::Integer(..) => "integer",
+            NodeKind::Float(_) => "float",
+            NodeKind::Boolean(_) => "boolean",
+            NodeKind::Datetime => "datetime",
+            NodeKind::Array(_) | NodeKind::List(_) => "array",
+            NodeKind::Table(_) => "table",
         };
         self.error(name.span, format!("cannot extend value of type {what} with a dotted key"));
         None

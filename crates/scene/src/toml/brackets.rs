@@ -1,18 +1,18 @@
-//! The square brackets of lists, as they stand in a text that may be broken.
+//! Finds the square brackets of arrays in a text that may have syntax errors.
 
 use toml_parser::Source;
 use toml_parser::lexer::TokenKind;
 
-/// A bracket of a list; those of headers, texts and comments are none.
+/// A bracket of an array. Brackets in headers, strings and comments are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) struct Bracket {
-    /// Its byte in the text.
+    /// Byte offset in the text.
     pub(in super::super) at: usize,
     /// Whether it is `[`.
     pub(in super::super) opens: bool,
 }
 
-/// The brackets of a text that begins with an expression, in its order.
+/// Returns the array brackets in a text that starts with an expression.
 pub(in super::super) fn brackets(text: &str) -> Vec<Bracket> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
@@ -46,7 +46,7 @@ pub(in super::super) fn brackets(text: &str) -> Vec<Bracket> {
     brackets
 }
 
-/// The last of the brackets that is open after them.
+/// The offset of the innermost bracket that is still open at the end.
 pub(in super::super) fn last_open(brackets: &[Bracket]) -> Option<usize> {
     let mut closed = 0_usize;
     for bracket in brackets.iter().rev() {
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn brackets_of_headers_texts_and_comments_do_not_count() {
+    fn only_array_brackets_count() {
         let open = |text: &str| last_open(&brackets(text));
         for closed in [
             "",

@@ -1,28 +1,28 @@
-//! Syntax errors of the TOML itself.
+//! TOML errors.
 
 use std::ops::Range;
 
 use toml_parser::{Expected, ParseError};
 
-/// An error of the syntax, or of keys that contradict each other.
+/// A TOML syntax error, or a duplicate or conflicting key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in super::super) struct SyntaxError {
-    /// Bytes of the text.
+    /// Byte range in the text.
     pub(in super::super) span: Range<usize>,
-    /// In a few words.
+    /// Short description.
     pub(in super::super) what: String,
     /// Expected tokens: a list, or `nothing`.
     pub(in super::super) expected: Option<String>,
 }
 
 impl SyntaxError {
-    /// An error of a part of the text that begins at byte `base`.
+    /// Converts a parser error for the part of the text that starts at byte `base`.
     pub(super) fn new(error: &ParseError, base: usize) -> Self {
         let span = error.unexpected().map_or(0..0, |span| base + span.start()..base + span.end());
         Self { span, what: error.description().to_owned(), expected: error.expected().map(list) }
     }
 
-    /// An error of one's own.
+    /// An error that is not from the parser.
     pub(super) fn at(span: Range<usize>, what: impl Into<String>) -> Self {
         Self { span, what: what.into(), expected: None }
     }
@@ -44,29 +44,29 @@ fn one(expected: &Expected) -> String {
         }
         Expected::Literal(text) => format!("`{text}`"),
         Expected::Description(text) => (*text).to_owned(),
-        // The list of `toml_parser` may grow.
+        // The enum is non-exhaustive.
         _ => "something else".to_owned(),
     }
 }
 
-/// The first errors of a kind; nobody reads on after those.
+/// A bounded list of errors.
 #[derive(Debug, Default)]
 pub(super) struct Errors(Vec<SyntaxError>);
 
 impl Errors {
-    /// Enough to find the first of them in the order of the text, in all files but monstrous ones.
-    const MOST: usize = 2_000;
+    /// Enough that the first errors in text order are found, except in absurdly broken files.
+    const CAPACITY: usize = 2_000;
 
     pub(super) fn push_with(&mut self, make: impl FnOnce() -> SyntaxError) {
-        if self.0.len() < Self::MOST {
+        if self.0.len() < Self::CAPACITY {
             self.0.push(make());
         }
     }
 
-    /// These, then those.
+    /// Concatenates both lists.
     pub(super) fn then(mut self, others: Self) -> Vec<SyntaxError> {
         self.0.extend(others.0);
-        self.0.truncate(Self::MOST);
+        self.0.truncate(Self::CAPACITY);
         self.0
     }
 }

@@ -1,7 +1,7 @@
-//! The events of `toml_parser` become headers, keys and values.
+//! Converts the events of `toml_parser` to headers, keys and values.
 //!
-//! Events of a broken text are broken too: a close without its open, a key in place of a value. They become the same values as in
-//! the `toml` crate.
+//! In a broken text, events may be inconsistent: a close without an open, or a key in place of a value. They give the same
+//! values as in the `toml` crate.
 
 use std::borrow::Cow;
 
@@ -9,22 +9,22 @@ use toml_parser::Source;
 use toml_parser::decoder::{IntegerRadix, ScalarKind};
 use toml_parser::parser::{Event, EventKind};
 
-use super::DEEPEST;
-use super::assembly::{Assembly, Header, Sink};
+use super::MAX_DEPTH;
+use super::assembly::{Assembly, ErrorCollector, TableHeader};
 use super::error::SyntaxError;
-use super::tree::{Kind, Name, Node, Origin, Radix, Span};
+use super::tree::{Name, NodeKind, Radix, Span, TableOrigin, ValueNode};
 
 /// The events of one expression.
 pub(super) struct Events<'e, 's> {
     pub(super) events: &'e [Event],
-    /// The text that the events point into, and where it begins in the document.
+    /// The text that the events index into, and its offset in the document.
     pub(super) source: Source<'s>,
     pub(super) base: usize,
     pub(super) assembly: &'e mut Assembly<'s>,
 }
 
 impl<'s> Events<'_, 's> {
-    /// Reads all of them.
+    /// Reads all events.
     pub(super) fn read(mut self) {
         if self.assembly.open.is_some() {
             self.header();
@@ -35,11 +35,11 @@ impl<'s> Events<'_, 's> {
                     self.assembly.finish_table();
                     let is_list = event.kind() == EventKind::ArrayTableOpen;
                     let span = self.span(event);
-                    self.assembly.open = Some(Header { path: Vec::new(), key: None, span, is_list });
+                    self.assembly.open = Some(TableHeader { path: Vec::new(), key: None, span, is_list });
                     self.header();
                 }
                 EventKind::SimpleKey => self.key_value(event),
-                // Space, and what the text breaks off with.
+                // White space, and the remains of incomplete expressions.
                 _ => {}
             }
         }
@@ -60,7 +60,7 @@ impl<'s> Events<'_, 's> {
         Span::new(self.base + event.span().start(), self.base + event.span().end())
     }
 
-    /// The rest of the open header. A header that is not closed takes the key and the end of the next one.
+    /// Reads the rest of the open header. An unclosed header takes the key and the end of the next one.
     fn header(&mut self) {
         let Some(mut header) = self.assembly.open.take() else { return };
         while let Some(event) = self.next() {
@@ -89,14 +89,14 @@ impl<'s> Events<'_, 's> {
         self.assembly.key_value(&path, key, value);
     }
 
-    /// Substitute for a missing value.
-    fn no_value(&mut self) -> Node {
+    /// Placeholder for a missing value.
+    fn no_value(&mut self) -> ValueNode {
         let span = Span::default();
         let text = self.assembly.text(span, Cow::Borrowed("0"));
-        Node { span, kind: Kind::Integer(text, Radix::Decimal) }
+        ValueNode { span, kind: NodeKind::Integer(text, Radix::Decimal) }
     }
 
-    /// A key and the keys that it is dotted with: all but the last, and the last, if there are not too many.
+    /// Reads a dotted key. Returns its path and last part, which is `None` if there are too many parts.
     fn key(&mut self, event: Event) -> (Vec<Name<'s>>, Option<Name<'s>>) {
         let mut path = Vec::new();
         let mut last = event;
@@ -106,7 +106,7 @@ impl<'s> Events<'_, 's> {
                 if event.kind() != EventKind::SimpleKey {
                     continue;
                 }
-                if parts < DEEPEST {
+                if parts < MAX_DEPTH {
                     let name = self.name(last);
                     path.push(name);
                 }
@@ -115,7 +115,7 @@ impl<'s> Events<'_, 's> {
                 break;
             }
         }
-        if parts > DEEPEST {
+        if parts > MAX_DEPTH {
             let span = Span { end: self.span(last).end, ..self.span(event) };
             self.assembly.meaning.push_with(|| SyntaxError::at(span.range(), "recursion limit"));
             return (Vec::new(), None);
@@ -135,14 +135,14 @@ impl<'s> Events<'_, 's> {
 
     fn name(&mut self, event: Event) -> Name<'s> {
         let mut text = Cow::Borrowed("");
-        let mut sink = Sink { errors: &mut self.assembly.meaning, base: self.base };
+        let mut sink = ErrorCollector { errors: &mut self.assembly.meaning, base: self.base };
         if let Some(raw) = self.source.get(event) {
             raw.decode_key(&mut text, &mut sink);
         }
         Name { span: self.span(event), text }
     }
 
-    fn value(&mut self, event: Event) -> Option<Node> {
+    fn value(&mut self, event: Event) -> Option<ValueNode> {
         match event.kind() {
             EventKind::InlineTableOpen => Some(self.inline_table(event)),
             EventKind::ArrayOpen => Some(self.array(event)),
@@ -151,10 +151,10 @@ impl<'s> Events<'_, 's> {
         }
     }
 
-    fn scalar(&mut self, event: Event) -> Node {
+    fn scalar(&mut self, event: Event) -> ValueNode {
         let span = self.span(event);
         let mut decoded = Cow::Borrowed("");
-        let mut sink = Sink { errors: &mut self.assembly.meaning, base: self.base };
+        let mut sink = ErrorCollector { errors: &mut self.assembly.meaning, base: self.base };
         let raw = self.source.get(event);
         let kind = raw.map_or(ScalarKind::String, |raw| raw.decode_scalar(&mut decoded, &mut sink));
         if kind == ScalarKind::DateTime
@@ -164,17 +164,17 @@ impl<'s> Events<'_, 's> {
         }
         let mut text = || self.assembly.text(span, std::mem::take(&mut decoded));
         let kind = match kind {
-            ScalarKind::String => Kind::String(text()),
-            ScalarKind::Boolean(value) => Kind::Boolean(value),
-            ScalarKind::DateTime => Kind::Datetime,
-            ScalarKind::Float => Kind::Float(text()),
-            ScalarKind::Integer(radix) => Kind::Integer(text(), base_of(radix)),
+            ScalarKind::String => NodeKind::String(text()),
+            ScalarKind::Boolean(value) => NodeKind::Boolean(value),
+            ScalarKind::DateTime => NodeKind::Datetime,
+            ScalarKind::Float => NodeKind::Float(text()),
+            ScalarKind::Integer(radix) => NodeKind::Integer(text(), base_of(radix)),
         };
-        Node { span, kind }
+        ValueNode { span, kind }
     }
 
-    /// An array up to its end, or to where it cannot go on.
-    fn array(&mut self, open: Event) -> Node {
+    /// Reads an array up to its end or the first unexpected event.
+    fn array(&mut self, open: Event) -> ValueNode {
         let first = self.assembly.elements.len();
         let mut span = self.span(open);
         let mut value = None;
@@ -200,12 +200,12 @@ impl<'s> Events<'_, 's> {
                 | EventKind::KeyValSep => break,
             }
         }
-        Node { span, kind: self.assembly.end_array(first) }
+        ValueNode { span, kind: self.assembly.end_array(first) }
     }
 
-    /// An inline table up to its end, or to where it cannot go on.
-    fn inline_table(&mut self, open: Event) -> Node {
-        let origin = Origin { is_inline: true, ..Origin::default() };
+    /// Reads an inline table up to its end or the first unexpected event.
+    fn inline_table(&mut self, open: Event) -> ValueNode {
+        let origin = TableOrigin { is_inline: true, ..TableOrigin::default() };
         let table = self.assembly.document.add_table(origin);
         let mut span = self.span(open);
         let (mut key, mut value) = (None, None);
@@ -241,7 +241,7 @@ impl<'s> Events<'_, 's> {
                 | EventKind::KeySep => break,
             }
         }
-        Node { span, kind: Kind::Table(table) }
+        ValueNode { span, kind: NodeKind::Table(table) }
     }
 }
 

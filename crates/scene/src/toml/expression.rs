@@ -1,17 +1,17 @@
-//! One expression cut out of the text: a header or a key with its value, to the end of its line.
+//! Parses one expression: a header, or a key with its value, up to the end of its line.
 //!
-//! `toml_parser` reads lists of tokens, of 24 bytes each. So that the list of a large document is never whole in memory,
-//! expressions are cut where the parser is sure to be done with them.
+//! `toml_parser` takes a list of tokens of 24 bytes each. To bound its memory, the document is split into expressions at
+//! points where the parser is certain to have finished one.
 
 use toml_parser::lexer::{Token, TokenKind};
 use toml_parser::parser::{Event, RecursionGuard, ValidateWhitespace, parse_document};
 use toml_parser::{ErrorSink, Source};
 
-use super::assembly::{Assembly, Sink};
+use super::assembly::{Assembly, ErrorCollector};
 use super::events::Events;
-use super::{DEEPEST, MARK};
+use super::{MARK, MAX_DEPTH};
 
-/// Memory that all expressions share.
+/// Parser of expressions, with buffers that are reused.
 #[derive(Default)]
 pub(super) struct Expressions {
     tokens: Vec<Token>,
@@ -19,23 +19,23 @@ pub(super) struct Expressions {
 }
 
 impl Expressions {
-    /// Reads the expression that begins a line at byte `at`; gives the byte after it.
+    /// Reads the expression that starts at byte `at`, the start of a line. Returns the offset after it.
     pub(super) fn read<'s>(&mut self, source: &'s str, at: usize, assembly: &mut Assembly<'s>) -> usize {
         self.tokens.clear();
         self.events.clear();
-        // A text that begins with a byte order mark is read without it, which is right for the first line alone: the
-        // others are read with the end of the line before.
+        // The lexer skips a byte order mark at the start of its text, which is right only for the first line. Give it the
+        // previous newline before all other lines.
         let first = at == if source.starts_with(MARK) { MARK.len() } else { 0 };
         let base = if first { 0 } else { at - 1 };
         let part = Source::new(source.get(base..).unwrap_or_default());
-        let mut end = Cut::default();
+        let mut end = ExpressionScanner::default();
         for token in part.lex().skip(usize::from(!first)) {
             self.tokens.push(token);
-            if end.is_after(token.kind()) {
+            if end.ends_with(token.kind()) {
                 break;
             }
         }
-        let mut sink = Sink { errors: &mut assembly.syntax, base };
+        let mut sink = ErrorCollector { errors: &mut assembly.syntax, base };
         parse(&self.tokens, part, &mut self.events, &mut sink);
         let next = self.tokens.last().map_or(source.len(), |token| base + token.span().end());
         if !assembly.is_lost {
@@ -47,38 +47,38 @@ impl Expressions {
 
 fn parse(tokens: &[Token], source: Source<'_>, events: &mut Vec<Event>, errors: &mut dyn ErrorSink) {
     let mut receiver = ValidateWhitespace::new(events, source);
-    let mut receiver = RecursionGuard::new(&mut receiver, DEEPEST);
+    let mut receiver = RecursionGuard::new(&mut receiver, MAX_DEPTH);
     parse_document(tokens, &mut receiver, errors);
 }
 
 /// Finds the end of an expression.
 ///
-/// Open brackets. They include those open in the parser, in order: each is closed only by its own kind. If brackets are wrong,
-/// the parser may be done earlier, but it is never within a value while none is open here.
+/// `open` is a supersequence of the brackets open in the parser, as each is closed only by its own kind. With mismatched
+/// brackets the parser may finish earlier, but it is never inside a value while `open` is empty.
 #[derive(Default)]
-struct Cut {
+struct ExpressionScanner {
     phase: Phase,
     open: Vec<TokenKind>,
 }
 
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 enum Phase {
-    /// Before anything but space.
+    /// Before the first token that is not white space.
     #[default]
     Start,
-    /// After the beginning of a key.
+    /// Inside or after a key.
     Key,
     /// After `=`.
     Equals,
     /// Within brackets.
     Value,
-    /// Nothing that follows in this line can matter.
+    /// The rest of the line cannot open a value.
     Rest,
 }
 
-impl Cut {
-    /// Takes the next token; whether the expression ends with it.
-    fn is_after(&mut self, token: TokenKind) -> bool {
+impl ExpressionScanner {
+    /// Processes the next token. Returns whether it ends the expression.
+    fn ends_with(&mut self, token: TokenKind) -> bool {
         use TokenKind as T;
         let is_end = token == T::Newline && self.open.is_empty();
         self.phase = match (self.phase, token) {

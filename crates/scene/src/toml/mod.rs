@@ -1,24 +1,23 @@
-//! TOML text as a compact tree that points into the text.
+//! A TOML parser with a compact tree that references the text.
 //!
-//! [`parse`] reads a document line by line. [`plain`] reads the simplest lines, of which large scenes consist; every
-//! other expression is cut out by [`expression`], read by the events of `toml_parser` and made into values by
-//! [`events`]. [`assembly`] puts the keys and values into tables by the rules of TOML, [`tree`] holds them. Nothing here
-//! knows what a scene is. Documents with errors are read as far as they can be understood.
+//! [`parse`] reads a document line by line. [`plain`] handles simple lines, which make up most of large scenes. All others are
+//! split by [`expression`], parsed by `toml_parser` and converted to values by [`events`]. [`assembly`] inserts keys and values
+//! into the tables of a [`tree`]. This module does not know about scenes. It recovers from errors.
 //!
-//! ## Why the tree is not that of the crate `toml`
+//! ## Why not the tree of the `toml` crate
 //!
-//! `toml::de::DeTable::parse_recoverable` (1.2) has spans and recovery too. Both were measured on a scene of a million spheres,
-//! 77 MB of text, on the same machine in turns:
+//! `toml::de::DeTable::parse_recoverable` (1.2) also has spans and error recovery. Measured alternately on the same machine, on
+//! a scene of a million spheres (77 MB of text):
 //!
 //! | | this tree | `DeTable` |
 //! | --- | --- | --- |
 //! | processor time, user + system | 0.21 + 0.18 s | 1.5 + 1.4 s or more |
 //! | memory of the tree | 192 MB | 985 MB |
-//! | most memory at once, beside the text | 192 MB | 2.67 GB |
-//! | errors in `tests/broken` | | the same messages and places, but no place where dotted keys are too deep |
+//! | peak memory, without the text | 192 MB | 2.67 GB |
+//! | errors in `tests/broken` | | the same messages and spans, but no span for dotted keys that are too deep |
 //!
-//! The library stays the reference of tests: both have the grammar of `toml_parser`, and therefore its errors. Scenes of that
-//! size are in use, and the library's tree would take more memory than the spheres that are rendered.
+//! The `toml` crate remains the reference in tests: both use the grammar of `toml_parser` and report its errors. Scenes of that
+//! size are in use, and the crate's tree would take more memory than the rendered spheres.
 
 mod assembly;
 mod brackets;
@@ -34,44 +33,43 @@ use expression::Expressions;
 
 pub(super) use brackets::{Bracket, brackets, last_open};
 pub(super) use error::SyntaxError;
-pub(super) use set::{Layout, NoPlace, Why};
-pub(super) use tree::{Document, Elements, Entries, Item, KeyValue, Value};
+pub(super) use set::{KeyError, KeyErrorKind, Layout};
+pub(super) use tree::{Document, Elements, Entries, KeyValue, TomlValue, Value};
 
-/// Arrays and tables may lie in each other this deep, and dotted keys have at most this many parts.
-const DEEPEST: u32 = 80;
+/// Deepest nesting of arrays and tables, and most parts of a dotted key.
+const MAX_DEPTH: u32 = 80;
 
-/// A byte order mark, which may begin a text and does not belong to it.
+/// The byte order mark that may precede a text.
 const MARK: &str = "\u{feff}";
 
-/// Whether a text is one value with a key that leads into a table, and nothing else.
+/// Whether a text consists of one dotted key with its value.
 pub(super) fn is_key_value(text: &str) -> bool {
     let (document, errors) = parse(text);
     errors.is_empty() && document.only_value(tree::Document::ROOT).is_some_and(|(keys, _)| keys.len() >= 2)
 }
 
-/// Puts what stands at byte `at`, a key and its value, in place of the value that the document has for that key. `source`
-/// begins with the text of the document.
+/// Sets the key at byte `at` of `source` to the value given there. `source` starts with the text of the document.
 ///
 /// # Errors
-/// The part of the key that leads nowhere.
+/// The part of the key that does not exist.
 pub(super) fn set<'s>(
     document: Document<'s>,
     source: &'s str,
     at: usize,
     layout: Layout,
-) -> (Document<'s>, Result<(), NoPlace>) {
-    let (mut assembly, apart) = Assembly::apart(document.within(source));
+) -> (Document<'s>, Result<(), KeyError>) {
+    let (mut assembly, detached) = Assembly::detached(document.with_source(source));
     Expressions::default().read(source, at, &mut assembly);
     let (mut document, _) = assembly.finish();
-    let placed = match document.only_value(apart) {
+    let placed = match document.only_value(detached) {
         Some((keys, value)) => document.put_at(&keys, value, layout),
         None => Ok(()),
     };
     (document, placed)
 }
 
-/// The tree of a text of less than 4 GiB, and its first errors: those of the syntax, then those of keys and values,
-/// each in the order of the text.
+/// Parses a text of less than 4 GiB. Returns its tree and first errors: syntax errors followed by errors of keys and values,
+/// both in text order.
 pub(super) fn parse(source: &str) -> (Document<'_>, Vec<SyntaxError>) {
     let mut assembly = Assembly::new(source);
     let mut expressions = Expressions::default();

@@ -1,17 +1,17 @@
-//! The simplest lines, read in one go: nothing, a comment, `[a]`, `[a.b]`, `[[a]]`, and `key = value` with a bare key
-//! and a decimal number, a word, a text without escapes, or a flat array of those on one line.
+//! A fast path for simple lines: blank lines, comments, `[a]`, `[a.b]`, `[[a]]`, and `key = value` with a bare key and a
+//! decimal number, a Boolean, a string without escapes, or a flat array of those on one line.
 //!
-//! Large scenes consist of such lines, which take a tenth of the time here. Any other line is left alone, so that its
-//! errors are those of [`super::expression`]; `tests` holds both ways to the same result.
+//! Large scenes consist of such lines, and this parser takes a tenth of the time. All other lines, including those with
+//! errors, are left to [`super::expression`]. Tests check that both give the same result.
 
 use std::borrow::Cow;
 
-use super::assembly::{Assembly, Header};
-use super::tree::{Kind, Name, Node, Radix, Span, Text};
+use super::assembly::{Assembly, TableHeader};
+use super::tree::{Name, NodeKind, Radix, Span, StringRef, ValueNode};
 
-/// Reads the line that begins at byte `at`, if it is one of the simplest; gives the byte after it.
+/// Reads the line that starts at byte `at` and returns the offset after it. `None` if the line is not simple.
 pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) -> Option<usize> {
-    let mut line = Line { source, at };
+    let mut line = LineScanner { source, at };
     line.space();
     match line.peek() {
         b'[' => {
@@ -37,7 +37,7 @@ pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) 
                 assembly.elements.truncate(before);
             } else {
                 let kind = value.kind.unwrap_or_else(|| assembly.end_array(before));
-                assembly.key_value(&[], key, Node { span: value.span, kind });
+                assembly.key_value(&[], key, ValueNode { span: value.span, kind });
             }
         }
         _ => line.end()?,
@@ -45,19 +45,20 @@ pub(super) fn read<'s>(source: &'s str, at: usize, assembly: &mut Assembly<'s>) 
     Some(line.at)
 }
 
-/// Value after the `=`; without a kind it is an array.
-struct Written {
+/// A value. Without a kind it is an array.
+struct ScannedValue {
     span: Span,
-    kind: Option<Kind>,
+    kind: Option<NodeKind>,
 }
 
-struct Line<'s> {
+/// A cursor in a line.
+struct LineScanner<'s> {
     source: &'s str,
     at: usize,
 }
 
-impl<'s> Line<'s> {
-    /// The byte here; a zero at the end.
+impl<'s> LineScanner<'s> {
+    /// The current byte, or 0 at the end.
     fn peek(&self) -> u8 {
         self.source.as_bytes().get(self.at).copied().unwrap_or(0)
     }
@@ -70,7 +71,7 @@ impl<'s> Line<'s> {
         Some(())
     }
 
-    /// Goes over bytes of a kind; how many there were.
+    /// Skips bytes while `is_one` holds. Returns their number.
     fn skip(&mut self, is_one: impl Fn(u8) -> bool) -> usize {
         let rest = self.source.as_bytes().get(self.at..).unwrap_or_default();
         let count = rest.iter().position(|byte| !is_one(*byte)).unwrap_or(rest.len());
@@ -82,7 +83,7 @@ impl<'s> Line<'s> {
         self.skip(|byte| byte == b' ' || byte == b'\t');
     }
 
-    /// Space, a comment and the end of the line or of the text.
+    /// Reads white space, a comment and the end of the line or of the text.
     fn end(&mut self) -> Option<()> {
         self.space();
         if self.peek() == b'#' {
@@ -106,7 +107,7 @@ impl<'s> Line<'s> {
         Some(Name { span: Span::new(start, self.at), text })
     }
 
-    fn header(&mut self) -> Option<Header<'s>> {
+    fn header(&mut self) -> Option<TableHeader<'s>> {
         let start = self.at;
         self.take(b'[')?;
         let is_list = self.take(b'[').is_some();
@@ -119,20 +120,20 @@ impl<'s> Line<'s> {
         if is_list {
             self.take(b']')?;
         }
-        Some(Header { path, key: Some(key), span: Span::new(start, self.at), is_list })
+        Some(TableHeader { path, key: Some(key), span: Span::new(start, self.at), is_list })
     }
 
-    /// The elements of an array go to `elements`.
-    fn value(&mut self, elements: &mut Vec<Node>) -> Option<Written> {
+    /// Reads a value. Pushes the elements of an array onto `elements`.
+    fn value(&mut self, elements: &mut Vec<ValueNode>) -> Option<ScannedValue> {
         let start = self.at;
         if self.take(b'[').is_none() {
-            let Node { span, kind } = self.scalar()?;
-            return Some(Written { span, kind: Some(kind) });
+            let ValueNode { span, kind } = self.scalar()?;
+            return Some(ScannedValue { span, kind: Some(kind) });
         }
         loop {
             self.space();
             if self.take(b']').is_some() {
-                return Some(Written { span: Span::new(start, self.at), kind: None });
+                return Some(ScannedValue { span: Span::new(start, self.at), kind: None });
             }
             elements.push(self.scalar()?);
             self.space();
@@ -142,7 +143,7 @@ impl<'s> Line<'s> {
         }
     }
 
-    fn scalar(&mut self) -> Option<Node> {
+    fn scalar(&mut self) -> Option<ValueNode> {
         let start = self.at;
         let kind = match self.peek() {
             b'"' => self.quoted(|byte| byte != b'"' && byte != b'\\')?,
@@ -151,31 +152,31 @@ impl<'s> Line<'s> {
             b'f' => self.word("false", false)?,
             _ => self.number()?,
         };
-        Some(Node { span: Span::new(start, self.at), kind })
+        Some(ValueNode { span: Span::new(start, self.at), kind })
     }
 
-    fn quoted(&mut self, is_plain: impl Fn(u8) -> bool) -> Option<Kind> {
+    fn quoted(&mut self, is_plain: impl Fn(u8) -> bool) -> Option<NodeKind> {
         let quote = self.peek();
         self.at += 1;
         let length = self.skip(|byte| is_plain(byte) && (byte == b'\t' || byte >= b' ') && byte != 0x7f);
         self.take(quote)?;
-        // Three quotes begin a text of several lines.
+        // Three quotes start a multi-line string.
         if length == 0 && self.peek() == quote {
             return None;
         }
-        Some(Kind::String(Text::QUOTED))
+        Some(NodeKind::String(StringRef::QUOTED))
     }
 
-    fn word(&mut self, word: &str, value: bool) -> Option<Kind> {
+    fn word(&mut self, word: &str, value: bool) -> Option<NodeKind> {
         if !self.source.as_bytes().get(self.at..)?.starts_with(word.as_bytes()) {
             return None;
         }
         self.at += word.len();
-        self.is_apart().then_some(Kind::Boolean(value))
+        self.is_at_delimiter().then_some(NodeKind::Boolean(value))
     }
 
-    /// A decimal number; what follows it must not belong to it.
-    fn number(&mut self) -> Option<Kind> {
+    /// Reads a decimal number that ends at a delimiter.
+    fn number(&mut self) -> Option<NodeKind> {
         let sign = matches!(self.peek(), b'+' | b'-');
         self.at += usize::from(sign);
         let has_zero = self.peek() == b'0';
@@ -194,17 +195,20 @@ impl<'s> Line<'s> {
             self.at += usize::from(matches!(self.peek(), b'+' | b'-'));
             self.digits()?;
         }
-        let kind =
-            if is_float { Kind::Float(Text::WHOLE) } else { Kind::Integer(Text::WHOLE, Radix::Decimal) };
-        self.is_apart().then_some(kind)
+        let kind = if is_float {
+            NodeKind::Float(StringRef::WHOLE)
+        } else {
+            NodeKind::Integer(StringRef::WHOLE, Radix::Decimal)
+        };
+        self.is_at_delimiter().then_some(kind)
     }
 
     fn digits(&mut self) -> Option<()> {
         (self.skip(|byte| byte.is_ascii_digit()) > 0).then_some(())
     }
 
-    /// Whether a value ends here.
-    fn is_apart(&self) -> bool {
+    /// Whether the next byte is a delimiter, so the value ends here.
+    fn is_at_delimiter(&self) -> bool {
         matches!(self.peek(), b' ' | b'\t' | b',' | b']' | b'\r' | b'\n' | b'#')
             || self.at == self.source.len()
     }

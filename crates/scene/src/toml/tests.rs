@@ -1,17 +1,17 @@
-//! Held to what the `toml` crate makes of the same text: values, places, errors, and what is left of broken documents.
+//! Compares values, spans, errors and recovery with the `toml` crate.
 
 use ::toml::de::{DeTable, DeValue};
 use proptest::prelude::*;
 
 use super::*;
 
-/// Every error with its place, as the `toml` crate words it.
+/// Formats errors as the `toml` crate does.
 fn errors(errors: &[SyntaxError]) -> Vec<(std::ops::Range<usize>, String)> {
-    let words = |error: &SyntaxError| match &error.expected {
+    let message = |error: &SyntaxError| match &error.expected {
         Some(expected) => format!("{}, expected {expected}", error.what),
         None => error.what.clone(),
     };
-    errors.iter().map(|error| (error.span.clone(), words(error))).collect()
+    errors.iter().map(|error| (error.span.clone(), message(error))).collect()
 }
 
 #[track_caller]
@@ -30,26 +30,26 @@ fn assert_same_table(text: &str, ours: Entries<'_>, theirs: &DeTable<'_>) {
 #[track_caller]
 fn assert_same_value(text: &str, ours: Value<'_>, theirs: &DeValue<'_>) {
     match (ours.item(), theirs) {
-        (Item::String(ours), DeValue::String(theirs)) => assert_eq!(ours, theirs, "{text:?}"),
-        (Item::Integer { digits, radix }, DeValue::Integer(theirs)) => {
+        (TomlValue::String(ours), DeValue::String(theirs)) => assert_eq!(ours, theirs, "{text:?}"),
+        (TomlValue::Integer { digits, radix }, DeValue::Integer(theirs)) => {
             assert_eq!((digits, radix), (theirs.as_str(), theirs.radix()), "{text:?}");
         }
-        (Item::Float(ours), DeValue::Float(theirs)) => assert_eq!(ours, theirs.as_str(), "{text:?}"),
-        (Item::Boolean(ours), DeValue::Boolean(theirs)) => assert_eq!(ours, *theirs, "{text:?}"),
-        (Item::Datetime, DeValue::Datetime(_)) => {}
-        (Item::Array(ours), DeValue::Array(theirs)) => {
+        (TomlValue::Float(ours), DeValue::Float(theirs)) => assert_eq!(ours, theirs.as_str(), "{text:?}"),
+        (TomlValue::Boolean(ours), DeValue::Boolean(theirs)) => assert_eq!(ours, *theirs, "{text:?}"),
+        (TomlValue::Datetime, DeValue::Datetime(_)) => {}
+        (TomlValue::Array(ours), DeValue::Array(theirs)) => {
             assert_eq!(ours.len(), theirs.len(), "{text:?}");
             for (one, other) in ours.iter().zip(theirs) {
                 assert_eq!(one.span(), other.span(), "{text:?}");
                 assert_same_value(text, one, other.get_ref());
             }
         }
-        (Item::Table(ours), DeValue::Table(theirs)) => assert_same_table(text, ours, theirs),
+        (TomlValue::Table(ours), DeValue::Table(theirs)) => assert_same_table(text, ours, theirs),
         (ours, theirs) => panic!("{ours:?} is not {theirs:?} in {text:?}"),
     }
 }
 
-/// Whether the text is TOML.
+/// Compares a text with the `toml` crate. Returns whether it is valid.
 #[track_caller]
 fn assert_same(text: &str) -> bool {
     let (theirs, their_errors) = DeTable::parse_recoverable(text);
@@ -59,7 +59,7 @@ fn assert_same(text: &str) -> bool {
         .map(|error| (error.span().unwrap_or_default(), error.message().to_owned()))
         .collect();
     let our_found = errors(&our_errors).into_iter().map(|(span, message)| {
-        // The crate does not say where a key has too many parts.
+        // The crate has no span for keys with too many parts.
         let is_placed = message != "recursion limit" || their_errors.iter().any(|(other, _)| *other == span);
         (if is_placed { span } else { 0..0 }, message)
     });
@@ -198,7 +198,7 @@ const KEYS: [&str; 14] = [
     "a.\"b.c\"",
 ];
 
-/// Lines that get in each other's way.
+/// Lines that may conflict with each other.
 fn line() -> impl Strategy<Value = String> {
     let value = prop::sample::select(&VALUES[..]);
     let key = prop::sample::select(&KEYS[..]);
@@ -226,7 +226,7 @@ fn lines() -> impl Strategy<Value = String> {
 }
 
 #[test]
-fn every_line_alone_and_every_pair() {
+fn single_lines_and_pairs_match_the_crate() {
     let mut valid = 0;
     let all: Vec<String> = LINES
         .iter()
@@ -244,8 +244,8 @@ fn every_line_alone_and_every_pair() {
 }
 
 #[test]
-fn brackets_in_any_order_end_where_the_parser_ends() {
-    // All texts of six of these, inside of an expression and before another one.
+fn brackets_in_any_order_match_the_crate() {
+    // All sequences of six of these, within an expression and followed by another.
     let parts = ["[", "]", "{", "}", ",", "\n", "b=", "1 "];
     for number in 0..parts.len().pow(6) {
         let mut rest = number;
@@ -261,10 +261,10 @@ fn brackets_in_any_order_end_where_the_parser_ends() {
 }
 
 #[test]
-fn scenes_are_read_alike() {
+fn scenes_match_the_crate() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut count = 0;
-    for part in ["../../scenes", "../../tests/broken", "src/scene"] {
+    for part in ["../../scenes", "../../tests/broken", "src"] {
         for entry in std::fs::read_dir(folder.join(part)).expect("a folder") {
             let path = entry.expect("an entry").path();
             if path.extension().is_some_and(|ending| ending == "toml") {
@@ -277,7 +277,7 @@ fn scenes_are_read_alike() {
 }
 
 #[test]
-fn many_keys_are_found_removed_and_counted() {
+fn large_tables_match_the_crate() {
     let text: String =
         (0..100).map(|number| format!("[t.k{number}.\"x\\u0020y\"]\nv = {number}\n")).collect();
     let again: String = (0..100).map(|number| format!("[t.k{number}]\nw = {number}\n")).collect();
@@ -287,7 +287,7 @@ fn many_keys_are_found_removed_and_counted() {
 }
 
 #[test]
-fn a_key_with_too_many_parts_is_told_in_its_place() {
+fn overlong_keys_are_reported_in_place() {
     let text = |parts: usize| format!("\n[x]\n{}a = 1\n", "a.".repeat(parts - 1));
     assert!(assert_same(&text(80)));
     let long = text(81);
@@ -297,7 +297,7 @@ fn a_key_with_too_many_parts_is_told_in_its_place() {
 }
 
 #[test]
-fn a_million_spheres_are_small() {
+fn spheres_take_200_bytes() {
     let sphere = "\n[[sphere]]\ncenter = [1.5, -2, 3e1] # somewhere\nradius = 0.5\nmaterial = \"red\"\n";
     let text = sphere.repeat(1_000);
     let (document, errors) = parse(&text);
@@ -309,12 +309,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(4_000))]
 
     #[test]
-    fn lines_in_any_order(text in lines()) {
+    fn random_lines_match_the_crate(text in lines()) {
         assert_same(&text);
     }
 
     #[test]
-    fn mutated_scenes(
+    fn mutated_scenes_match_the_crate(
         changes in prop::collection::vec((any::<prop::sample::Index>(), 0_usize..12, line()), 1..5),
     ) {
         let mut text: Vec<char> = super::super::starter().chars().collect();

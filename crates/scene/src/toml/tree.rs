@@ -1,12 +1,12 @@
-//! The tree: nodes of 16 bytes in a few long lists, texts as places in the source.
+//! The document tree: nodes of 16 bytes in a few vectors, with strings as spans of the source.
 //!
-//! A sphere with a centre, a radius and a material takes about 180 bytes.
+//! A sphere with a center, a radius and a material takes about 180 bytes.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Bytes of the source.
+/// Byte range in the source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) start: u32,
@@ -14,7 +14,7 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// The source has less than 4 GiB.
+    /// Offsets are below 4 GiB.
     pub(super) fn new(start: usize, end: usize) -> Self {
         let offset = |at| u32::try_from(at).unwrap_or(u32::MAX);
         Self { start: offset(start), end: offset(end) }
@@ -25,11 +25,11 @@ impl Span {
     }
 }
 
-/// A decoded text: its whole span, its span without the quotes, or a text of the document's own.
+/// A decoded string: the whole span, the span without its quotes, or an index into the document's decoded strings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Text(u32);
+pub(super) struct StringRef(u32);
 
-impl Text {
+impl StringRef {
     pub(super) const WHOLE: Self = Self(u32::MAX);
     pub(super) const QUOTED: Self = Self(u32::MAX - 1);
 }
@@ -47,73 +47,73 @@ pub(super) enum Radix {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct TableId(u32);
 
-/// Kind of a node.
+/// Kind of a value.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
-    String(Text),
-    Integer(Text, Radix),
-    Float(Text),
+pub(super) enum NodeKind {
+    String(StringRef),
+    Integer(StringRef, Radix),
+    Float(StringRef),
     Boolean(bool),
     Datetime,
     /// `[…]`: index into the arrays.
     Array(u32),
-    /// All `[[name]]` of one name: index into the lists.
+    /// The tables `[[name]]` of one name: index into the lists.
     List(u32),
     Table(TableId),
 }
 
-impl Kind {
-    /// Index of the table, if it is one.
+impl NodeKind {
+    /// The table, if the value is one.
     pub(super) fn table(self) -> Option<TableId> {
         if let Self::Table(table) = self { Some(table) } else { None }
     }
 }
 
-/// A value and its place.
+/// A value and its span.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
+pub(super) struct ValueNode {
     pub(super) span: Span,
-    pub(super) kind: Kind,
+    pub(super) kind: NodeKind,
 }
 
-/// A key with its value, in the list of its table.
+/// A key with its value, in the linked list of its table.
 #[derive(Clone, Copy, Debug)]
-struct Entry {
+struct TableEntry {
     key: Span,
-    text: Text,
-    node: Node,
+    text: StringRef,
+    node: ValueNode,
     /// The next entry of the table, or [`NONE`].
     next: u32,
     is_removed: bool,
 }
 
-/// No entry.
+/// End of a linked list.
 const NONE: u32 = u32::MAX;
 
-/// Origin of a table, which decides whether keys may be added to it.
+/// Origin of a table, which determines whether keys may be added to it.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Origin {
-    /// Whether a longer header or key than its own made it.
+pub(super) struct TableOrigin {
+    /// Whether it was created by a longer header or key.
     pub(super) is_implicit: bool,
-    /// Whether a dotted key made it.
+    /// Whether it was created by a dotted key.
     pub(super) is_dotted: bool,
-    /// Within braces.
+    /// Whether it is an inline table or part of one.
     pub(super) is_inline: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Table {
+struct TableRecord {
     first: u32,
     last: u32,
-    /// Entries in the list, removed ones too.
+    /// Number of entries, including removed ones.
     length: u32,
-    origin: Origin,
+    origin: TableOrigin,
 }
 
-/// Tables with more entries than this are searched by hash.
-const FEW: u32 = 16;
+/// Tables with more entries than this use the hash index.
+const MAX_LINEAR: u32 = 16;
 
-/// A key before it is in a table.
+/// A key that is not yet in a table.
 #[derive(Clone, Debug)]
 pub(super) struct Name<'s> {
     pub(super) span: Span,
@@ -124,22 +124,22 @@ pub(super) struct Name<'s> {
 #[derive(Debug)]
 pub(in super::super) struct Document<'s> {
     source: &'s str,
-    /// Decoded texts that do not stand in the source.
+    /// Decoded strings that differ from the source.
     texts: Vec<String>,
-    tables: Vec<Table>,
-    entries: Vec<Entry>,
-    /// Each array's part of the elements.
+    tables: Vec<TableRecord>,
+    entries: Vec<TableEntry>,
+    /// Each array's range of `elements`.
     arrays: Vec<Span>,
-    elements: Vec<Node>,
-    lists: Vec<Vec<Node>>,
-    /// Entries of the tables with many.
+    elements: Vec<ValueNode>,
+    lists: Vec<Vec<ValueNode>>,
+    /// Entries of tables with more than [`MAX_LINEAR`] entries.
     index: HashMap<(TableId, Cow<'s, str>), u32>,
 }
 
 impl<'s> Document<'s> {
     pub(super) const ROOT: TableId = TableId(0);
 
-    /// With an empty root.
+    /// Creates a document with an empty root.
     pub(super) fn new(source: &'s str) -> Self {
         let mut document = Self {
             source,
@@ -151,99 +151,99 @@ impl<'s> Document<'s> {
             lists: Vec::new(),
             index: HashMap::new(),
         };
-        document.add_table(Origin::default());
+        document.add_table(TableOrigin::default());
         document
     }
 
-    /// The same document, with places in a text that begins with its own.
-    pub(super) fn within(self, source: &'s str) -> Self {
+    /// Replaces the source by a text that starts with it.
+    pub(super) fn with_source(self, source: &'s str) -> Self {
         Self { source, ..self }
     }
 
-    /// The top of the document.
+    /// The root table.
     pub(in super::super) fn root(&self) -> Entries<'_> {
         Entries { document: self, table: Self::ROOT }
     }
 
-    pub(super) fn add_table(&mut self, origin: Origin) -> TableId {
-        self.tables.push(Table { first: NONE, last: NONE, length: 0, origin });
+    pub(super) fn add_table(&mut self, origin: TableOrigin) -> TableId {
+        self.tables.push(TableRecord { first: NONE, last: NONE, length: 0, origin });
         TableId(index(self.tables.len() - 1))
     }
 
-    pub(super) fn origin(&self, table: TableId) -> Origin {
+    pub(super) fn origin(&self, table: TableId) -> TableOrigin {
         self.tables[table.0 as usize].origin
     }
 
-    pub(super) fn set_origin(&mut self, table: TableId, origin: Origin) {
+    pub(super) fn set_origin(&mut self, table: TableId, origin: TableOrigin) {
         self.tables[table.0 as usize].origin = origin;
     }
 
-    /// The elements become an array.
-    pub(super) fn add_array(&mut self, elements: &[Node]) -> Kind {
+    /// Adds an array.
+    pub(super) fn add_array(&mut self, elements: &[ValueNode]) -> NodeKind {
         let start = self.elements.len();
         self.elements.extend_from_slice(elements);
         self.arrays.push(Span::new(start, self.elements.len()));
-        Kind::Array(index(self.arrays.len() - 1))
+        NodeKind::Array(index(self.arrays.len() - 1))
     }
 
-    /// A list of tables, empty yet.
-    pub(super) fn add_list(&mut self) -> Kind {
+    /// Adds an empty list of tables.
+    pub(super) fn add_list(&mut self) -> NodeKind {
         self.lists.push(Vec::new());
-        Kind::List(index(self.lists.len() - 1))
+        NodeKind::List(index(self.lists.len() - 1))
     }
 
-    pub(super) fn list_mut(&mut self, list: u32) -> &mut Vec<Node> {
+    pub(super) fn list_mut(&mut self, list: u32) -> &mut Vec<ValueNode> {
         &mut self.lists[list as usize]
     }
 
-    /// Keeps the text of something at `span`.
-    pub(super) fn add_text(&mut self, span: Span, text: Cow<'s, str>) -> Text {
+    /// Stores a decoded string with this span.
+    pub(super) fn add_text(&mut self, span: Span, text: Cow<'s, str>) -> StringRef {
         let written = self.source.get(span.range()).unwrap_or_default();
         if text == written {
-            return Text::WHOLE;
+            return StringRef::WHOLE;
         }
         if written.len() >= 2 && written.get(1..written.len() - 1) == Some(&text) {
-            return Text::QUOTED;
+            return StringRef::QUOTED;
         }
         self.texts.push(text.into_owned());
-        Text(index(self.texts.len() - 1))
+        StringRef(index(self.texts.len() - 1))
     }
 
-    fn text(&self, span: Span, text: Text) -> &str {
+    fn text(&self, span: Span, text: StringRef) -> &str {
         let range = span.range();
         match text {
-            Text::WHOLE => self.source.get(range).unwrap_or_default(),
-            Text::QUOTED => self.source.get(range.start + 1..range.end - 1).unwrap_or_default(),
-            Text(own) => &self.texts[own as usize],
+            StringRef::WHOLE => self.source.get(range).unwrap_or_default(),
+            StringRef::QUOTED => self.source.get(range.start + 1..range.end - 1).unwrap_or_default(),
+            StringRef(own) => &self.texts[own as usize],
         }
     }
 
-    /// Adds an entry at the end of a table that has no such key.
-    pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: Node) {
+    /// Appends an entry to a table that does not have the key.
+    pub(super) fn add_entry(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
         let entry = index(self.entries.len());
         let text = self.add_text(name.span, name.text.clone());
-        self.entries.push(Entry { key: name.span, text, node, next: NONE, is_removed: false });
-        let Table { first, last, length, .. } = &mut self.tables[table.0 as usize];
+        self.entries.push(TableEntry { key: name.span, text, node, next: NONE, is_removed: false });
+        let TableRecord { first, last, length, .. } = &mut self.tables[table.0 as usize];
         let before = std::mem::replace(last, entry);
         *length += 1;
         match length {
             1 => *first = entry,
             _ => self.entries[before as usize].next = entry,
         }
-        if *length == FEW + 1 {
+        if *length == MAX_LINEAR + 1 {
             self.index_all(table);
-        } else if *length > FEW {
+        } else if *length > MAX_LINEAR {
             self.index.insert((table, name.text), entry);
         }
     }
 
-    /// From now on the table is searched by hash.
+    /// Adds all entries of a table to the hash index.
     fn index_all(&mut self, table: TableId) {
         let mut next = self.tables[table.0 as usize].first;
         while let Some(entry) = self.entries.get(next as usize).copied() {
             if !entry.is_removed {
                 let text = match entry.text {
-                    Text::WHOLE => Cow::Borrowed(self.source.get(entry.key.range()).unwrap_or_default()),
+                    StringRef::WHOLE => Cow::Borrowed(self.source.get(entry.key.range()).unwrap_or_default()),
                     _ => Cow::Owned(self.text(entry.key, entry.text).to_owned()),
                 };
                 self.index.insert((table, text), next);
@@ -253,8 +253,8 @@ impl<'s> Document<'s> {
     }
 
     fn find_entry(&self, table: TableId, name: &str) -> Option<u32> {
-        let Table { first, length, .. } = self.tables[table.0 as usize];
-        if length > FEW {
+        let TableRecord { first, length, .. } = self.tables[table.0 as usize];
+        if length > MAX_LINEAR {
             return self.index.get(&(table, Cow::Borrowed(name))).copied();
         }
         let mut next = first;
@@ -268,12 +268,12 @@ impl<'s> Document<'s> {
     }
 
     /// The value of a key.
-    pub(super) fn find(&self, table: TableId, name: &str) -> Option<Node> {
+    pub(super) fn find(&self, table: TableId, name: &str) -> Option<ValueNode> {
         self.find_entry(table, name).map(|entry| self.entries[entry as usize].node)
     }
 
-    /// Replaces the value of a key in a table; adds the key if it does not exist.
-    pub(super) fn put(&mut self, table: TableId, name: Name<'s>, node: Node) {
+    /// Sets the value of a key, adding it if necessary.
+    pub(super) fn put(&mut self, table: TableId, name: Name<'s>, node: ValueNode) {
         let Some(found) = self.find_entry(table, &name.text) else {
             return self.add_entry(table, name, node);
         };
@@ -282,14 +282,15 @@ impl<'s> Document<'s> {
         (entry.key, entry.text, entry.node) = (name.span, text, node);
     }
 
-    /// The only value below a table, and the dotted key that leads to it. `None` if there are several, or headers.
-    pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, Node)> {
+    /// The only value in a table, with its dotted key. `None` if there are several or it has a header.
+    pub(super) fn only_value(&self, table: TableId) -> Option<(Vec<Name<'s>>, ValueNode)> {
         let mut keys = Vec::new();
         let mut table = Some(table);
         let mut value = None;
         while let Some(above) = table {
-            let Table { first, length, .. } = self.tables[above.0 as usize];
-            let Entry { key, text, node, .. } = *self.entries.get(first as usize).filter(|_| length == 1)?;
+            let TableRecord { first, length, .. } = self.tables[above.0 as usize];
+            let TableEntry { key, text, node, .. } =
+                *self.entries.get(first as usize).filter(|_| length == 1)?;
             keys.push(Name { span: key, text: Cow::Owned(self.text(key, text).to_owned()) });
             table = node.kind.table().filter(|table| self.origin(*table).is_dotted);
             value = Some(node);
@@ -304,43 +305,43 @@ impl<'s> Document<'s> {
         Entries { document: self, table }.iter().map(|entry| entry.key.to_owned()).collect()
     }
 
-    /// The value of a key that is a text.
+    /// The value of a key, if it is a string.
     pub(super) fn find_text(&self, table: TableId, name: &str) -> Option<&str> {
         let node = self.find(table, name)?;
-        if let Kind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
+        if let NodeKind::String(text) = node.kind { Some(self.text(node.span, text)) } else { None }
     }
 
-    /// The elements of an array or a list; empty for other values.
-    pub(super) fn elements_of(&self, kind: Kind) -> Vec<Node> {
-        let value = Value { document: self, node: Node { span: Span::default(), kind } };
+    /// The elements of an array or list. Empty for other values.
+    pub(super) fn elements_of(&self, kind: NodeKind) -> Vec<ValueNode> {
+        let value = Value { document: self, node: ValueNode { span: Span::default(), kind } };
         value.array().map_or_else(Vec::new, |elements| elements.nodes.to_vec())
     }
 
-    /// Puts another value into an array or a list.
-    pub(super) fn set_element(&mut self, kind: Kind, index: usize, node: Node) {
+    /// Replaces an element of an array or list.
+    pub(super) fn set_element(&mut self, kind: NodeKind, index: usize, node: ValueNode) {
         let element = match kind {
-            Kind::Array(array) => {
+            NodeKind::Array(array) => {
                 let start = self.arrays[array as usize].start as usize;
                 self.elements.get_mut(start + index)
             }
-            Kind::List(list) => self.lists[list as usize].get_mut(index),
-            Kind::String(_)
-            | Kind::Integer(..)
-            | Kind::Float(_)
-            | Kind::Boolean(_)
-            | Kind::Datetime
-            | Kind::Table(_) => None,
+            NodeKind::List(list) => self.lists[list as usize].get_mut(index),
+            NodeKind::String(_)
+            | NodeKind::Integer(..)
+            | NodeKind::Float(_)
+            | NodeKind::Boolean(_)
+            | NodeKind::Datetime
+            | NodeKind::Table(_) => None,
         };
         if let Some(element) = element {
             *element = node;
         }
     }
 
-    /// Takes an entry out of its table.
-    pub(super) fn remove(&mut self, table: TableId, name: &str) -> Option<Node> {
+    /// Removes an entry from its table.
+    pub(super) fn remove(&mut self, table: TableId, name: &str) -> Option<ValueNode> {
         let found = self.find_entry(table, name)?;
-        // Only entries of tables with many are in the index.
-        if self.tables[table.0 as usize].length > FEW {
+        // Only large tables are indexed.
+        if self.tables[table.0 as usize].length > MAX_LINEAR {
             self.index.remove(&(table, Cow::Owned(name.to_owned())));
         }
         let entry = &mut self.entries[found as usize];
@@ -348,7 +349,7 @@ impl<'s> Document<'s> {
         Some(entry.node)
     }
 
-    /// Bytes of the tree.
+    /// Size of the tree in bytes.
     #[cfg(test)]
     pub(super) fn bytes(&self) -> usize {
         let lists: usize = self.lists.iter().map(|list| size_of_val(list.as_slice())).sum();
@@ -364,60 +365,62 @@ fn index(index: usize) -> u32 {
     u32::try_from(index).unwrap_or(NONE)
 }
 
-/// A value of a document.
+/// Reference to a value in a document.
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) struct Value<'d> {
     document: &'d Document<'d>,
-    node: Node,
+    node: ValueNode,
 }
 
-/// A value.
+/// A decoded value.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) enum Item<'d> {
-    /// Decoded.
+pub(in super::super) enum TomlValue<'d> {
+    /// A string without quotes and escapes.
     String(&'d str),
-    /// Digits with a sign, without underscores and prefix.
+    /// Digits with a sign, without underscores and radix prefix.
     Integer { digits: &'d str, radix: u32 },
-    /// Text that `f64::from_str` reads.
+    /// Text accepted by `f64::from_str`.
     Float(&'d str),
     /// `true` or `false`.
     Boolean(bool),
     /// A date, a time, or both.
     Datetime,
-    /// Values in brackets, or all tables `[[name]]`.
+    /// An array, or all tables `[[name]]`.
     Array(Elements<'d>),
-    /// With a header, in braces, or made by a dotted key.
+    /// A table from a header, braces or a dotted key.
     Table(Entries<'d>),
 }
 
 impl<'d> Value<'d> {
-    /// Bytes of the source; of a table its header or its braces.
+    /// Byte range in the source: for a table, its header or braces.
     pub(in super::super) fn span(&self) -> Range<usize> {
         self.node.span.range()
     }
 
     /// Its elements, if it is an array.
     pub(in super::super) fn array(&self) -> Option<Elements<'d>> {
-        if let Item::Array(array) = self.item() { Some(array) } else { None }
+        if let TomlValue::Array(array) = self.item() { Some(array) } else { None }
     }
 
-    /// The value.
-    pub(in super::super) fn item(&self) -> Item<'d> {
+    /// Decodes the value.
+    pub(in super::super) fn item(&self) -> TomlValue<'d> {
         let (document, span) = (self.document, self.node.span);
         match self.node.kind {
-            Kind::String(text) => Item::String(document.text(span, text)),
-            Kind::Integer(text, radix) => {
-                Item::Integer { digits: document.text(span, text), radix: radix as u32 }
+            NodeKind::String(text) => TomlValue::String(document.text(span, text)),
+            NodeKind::Integer(text, radix) => {
+                TomlValue::Integer { digits: document.text(span, text), radix: radix as u32 }
             }
-            Kind::Float(text) => Item::Float(document.text(span, text)),
-            Kind::Boolean(value) => Item::Boolean(value),
-            Kind::Datetime => Item::Datetime,
-            Kind::Array(array) => {
+            NodeKind::Float(text) => TomlValue::Float(document.text(span, text)),
+            NodeKind::Boolean(value) => TomlValue::Boolean(value),
+            NodeKind::Datetime => TomlValue::Datetime,
+            NodeKind::Array(array) => {
                 let nodes = &document.elements[document.arrays[array as usize].range()];
-                Item::Array(Elements { document, nodes })
+                TomlValue::Array(Elements { document, nodes })
             }
-            Kind::List(list) => Item::Array(Elements { document, nodes: &document.lists[list as usize] }),
-            Kind::Table(table) => Item::Table(Entries { document, table }),
+            NodeKind::List(list) => {
+                TomlValue::Array(Elements { document, nodes: &document.lists[list as usize] })
+            }
+            NodeKind::Table(table) => TomlValue::Table(Entries { document, table }),
         }
     }
 }
@@ -426,7 +429,7 @@ impl<'d> Value<'d> {
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) struct Elements<'d> {
     document: &'d Document<'d>,
-    nodes: &'d [Node],
+    nodes: &'d [ValueNode],
 }
 
 impl<'d> Elements<'d> {
@@ -435,15 +438,15 @@ impl<'d> Elements<'d> {
         self.nodes.len()
     }
 
-    /// In the order of the text.
+    /// The elements in text order.
     pub(in super::super) fn iter(&self) -> impl Iterator<Item = Value<'d>> + use<'d> {
         let document = self.document;
         self.nodes.iter().map(move |node| Value { document, node: *node })
     }
 
-    /// Whether the first one is a table.
+    /// Whether the first element is a table.
     pub(in super::super) fn is_of_tables(&self) -> bool {
-        self.nodes.first().is_some_and(|node| matches!(node.kind, Kind::Table(_)))
+        self.nodes.first().is_some_and(|node| matches!(node.kind, NodeKind::Table(_)))
     }
 }
 
@@ -459,7 +462,7 @@ pub(in super::super) struct Entries<'d> {
 pub(in super::super) struct KeyValue<'d> {
     /// The key, decoded.
     pub(in super::super) key: &'d str,
-    /// Its place.
+    /// Byte range of the key.
     pub(in super::super) span: Range<usize>,
     /// Its value.
     pub(in super::super) value: Value<'d>,
@@ -471,7 +474,7 @@ impl<'d> Entries<'d> {
         self.document.find_entry(self.table, name).map(|entry| self.entry(entry))
     }
 
-    /// In the order in which they were made.
+    /// The entries in insertion order.
     pub(in super::super) fn iter(&self) -> impl Iterator<Item = KeyValue<'d>> + use<'d> {
         let this = *self;
         let entries = &this.document.entries;
@@ -485,7 +488,7 @@ impl<'d> Entries<'d> {
 
     fn entry(&self, entry: u32) -> KeyValue<'d> {
         let document = self.document;
-        let Entry { key, text, node, .. } = document.entries[entry as usize];
+        let TableEntry { key, text, node, .. } = document.entries[entry as usize];
         KeyValue { key: document.text(key, text), span: key.range(), value: Value { document, node } }
     }
 }

@@ -9,7 +9,7 @@ use crate::fixtures::*;
 use crate::keymap::{KEYMAP, OVERLAY};
 use crate::pipeline::protocol::{self, Failure};
 use crate::pipeline::settings::{Effective, View};
-use crate::scene::diagnostic::{Diagnostic, Place, Severity};
+use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};
 
 /// Number of views.
 const VIEWS: u16 = View::ALL.len() as u16;
@@ -284,7 +284,7 @@ fn of_a_fault_in_many_places_ten_are_told() {
 
 fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
     let source: std::sync::Arc<str> = std::sync::Arc::from("first = 1\n".repeat(20));
-    let place = Place { source, span: line * 10 - 10..line * 10 - 5, label: String::new() };
+    let place = SourceSpan { source, span: line * 10 - 10..line * 10 - 5, label: String::new() };
     Diagnostic { place: Some(place), help: None, ..diagnostic(severity, message) }
 }
 

@@ -111,7 +111,7 @@ fn other_integrator(state: &State, supports: impl Fn(Method) -> bool) -> Option<
 }
 
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    if let Some(other) = other_integrator(state, |method| method.honours_shadows) {
+    if let Some(other) = other_integrator(state, |method| method.honors_shadows) {
         return notify(state, &messages::soft_shadows(state.request.integrator().name(), other));
     }
     let next = match state.request.shadows() {

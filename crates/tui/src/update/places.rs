@@ -1,7 +1,7 @@
 //! The position that the editor opens.
 
 use crate::event::FilePosition;
-use crate::scene::diagnostic::{Diagnostic, Place};
+use crate::scene::diagnostic::{Diagnostic, SourceSpan};
 use crate::state::State;
 
 /// The first error, else the clicked object, else the first warning, else the scene.
@@ -14,7 +14,7 @@ pub(super) fn to_edit(state: &State) -> FilePosition {
 
 /// Position of a diagnostic, if it refers to a file.
 fn in_file(diagnostic: &Diagnostic) -> Option<FilePosition> {
-    let Place { source, span, .. } = diagnostic.place.as_ref()?;
+    let SourceSpan { source, span, .. } = diagnostic.place.as_ref()?;
     let before = source.get(..span.start)?;
     let start = before.rfind('\n').map_or(0, |end| end + 1);
     let line = before.matches('\n').count() + 1;

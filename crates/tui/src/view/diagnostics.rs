@@ -135,7 +135,8 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
         Role::Frame => Tone::Faint,
         Role::Message => Tone::Strong,
     };
-    let line = |line: report::Line| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
+    let line =
+        |line: report::ReportLine| line.into_iter().map(|piece| (piece.text, tone(piece.role))).collect();
     let mut lines = report::lines(std::slice::from_ref(fault[0]), width);
     // The report ends with an empty line and a count, which the title shows already.
     lines.truncate(lines.len().saturating_sub(2));

@@ -105,8 +105,8 @@ fn toggles(state: &State) -> Vec<KeyHint> {
     if state.picture.history.is_open() {
         return Vec::new();
     }
-    let honours_shadows = state.request.integrator().method().honours_shadows;
-    let shadows = if honours_shadows { state.request.shadows().name() } else { "–" };
+    let honors_shadows = state.request.integrator().method().honors_shadows;
+    let shadows = if honors_shadows { state.request.shadows().name() } else { "–" };
     let on_off = |on| if on { "on" } else { "off" };
     let photons = on_off(state.request.effective.as_ref().is_some_and(|it| it.photons));
     let keys = &state.request.toggles;

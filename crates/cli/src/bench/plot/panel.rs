@@ -9,7 +9,7 @@ use crate::bench::results::{MethodResult, SceneResult, Step, Verdict};
 use crate::bench::slope::Slope;
 use crate::scene::sanitize::visible;
 
-/// Colours that the colour-blind tell apart, also in this order (Okabe and Ito).
+/// Colors that the color-blind tell apart, also in this order (Okabe and Ito).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -20,7 +20,7 @@ const COLORS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 const FAINT: RGBColor = RGBColor(225, 225, 225);
-const GREY: RGBColor = RGBColor(110, 110, 110);
+const GRAY: RGBColor = RGBColor(110, 110, 110);
 
 /// Pixels of a marker's half, and of the bars' ends.
 const MARKER: i32 = 4;
@@ -46,7 +46,7 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
         .configure_mesh()
         .light_line_style(TRANSPARENT)
         .bold_line_style(FAINT)
-        .axis_style(GREY)
+        .axis_style(GRAY)
         .label_style(("sans-serif", 14))
         .axis_desc_style(("sans-serif", 16))
         .x_desc(AXES[0])
@@ -91,9 +91,9 @@ fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), Failed<'a>> {
 
 /// The noise of a reference.
 fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &Axis) -> Result<(), Failed<'a>> {
-    let dashes = |points: Vec<(f64, f64)>| DashedLineSeries::new(points, 5, 5, GREY.stroke_width(1));
+    let dashes = |points: Vec<(f64, f64)>| DashedLineSeries::new(points, 5, 5, GRAY.stroke_width(1));
     let ends = vec![(across.range.start, level), (across.range.end, level)];
-    let sample = |(x, y): (i32, i32)| PathElement::new([(x, y), (x + 8, y)], GREY);
+    let sample = |(x, y): (i32, i32)| PathElement::new([(x, y), (x + 8, y)], GRAY);
     chart.draw_series(dashes(ends))?.label("noise of each reference").legend(sample);
     Ok(())
 }

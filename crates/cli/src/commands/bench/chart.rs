@@ -14,10 +14,10 @@ use crate::progress::seconds;
 use crate::scene::sanitize::visible;
 use crate::tui::paint::in_lines;
 
-/// Colours of the methods, in their order, from the palette of the terminal.
+/// Colors of the methods, in their order, from the palette of the terminal.
 const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
-/// Signs of the methods' points, in their order: no sign comes back with the same colour for thirty methods.
+/// Signs of the methods' points, in their order: no sign comes back with the same color for thirty methods.
 const SIGNS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Rows of a chart.
 const ROWS: u16 = 16;

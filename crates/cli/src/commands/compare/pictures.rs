@@ -12,7 +12,7 @@ use crate::film::tone::{ToneMapping, develop};
 use crate::scene::sanitize::visible;
 use crate::tui::{NamedImage, images_as_text};
 
-/// Less FLIP than this is hardly seen in its colours.
+/// Less FLIP than this is hardly seen in its colors.
 const FAINT: f32 = 0.1;
 
 /// Lines for stdout; none if the terminal has no room.
@@ -50,7 +50,7 @@ fn named(name: &str, image: &RadianceImage) -> NamedImage {
     NamedImage { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
 }
 
-/// FLIP in colours; if that is all but black, |a - b| as bright as it can be shown.
+/// FLIP in colors; if that is all but black, |a - b| as bright as it can be shown.
 fn difference(pair: &Pair, measured: &Measured) -> (RadianceImage, String) {
     let errors = &measured.errors;
     if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= FAINT) {

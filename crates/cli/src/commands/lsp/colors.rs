@@ -1,4 +1,4 @@
-//! Colours of a text, as swatches in the editor: linear numbers shown in sRGB.
+//! Colors of a text, as swatches in the editor: linear numbers shown in sRGB.
 
 use lsp_types::{Color, ColorInformation, ColorPresentation};
 use serde_json::{Value, json};
@@ -6,17 +6,20 @@ use serde_json::{Value, json};
 use super::document::Document;
 use crate::math::color::{linear_to_srgb, srgb8_to_linear};
 use crate::scene::keys::color_bytes;
-use crate::scene::keys::key::Kind;
+use crate::scene::keys::key::ValueKind;
 use crate::scene::outline::OutlineKey;
 
-/// All colours of a text.
+/// All colors of a text.
 pub(super) fn all(document: &Document) -> Value {
     let mut found = Vec::new();
     for table in &document.tables {
         let known = table.known();
         for key in &table.keys {
             let kind = known.iter().find(|info| info.name == key.name.text).map(|info| info.kind);
-            let is_color = matches!(kind, Some(Kind::Color(_) | Kind::ColorOrTexture(_) | Kind::Emission(_)));
+            let is_color = matches!(
+                kind,
+                Some(ValueKind::Color(_) | ValueKind::ColorOrTexture(_) | ValueKind::Emission(_))
+            );
             if let Some(color) = color(&document.text, key).filter(|_| is_color) {
                 found.push(ColorInformation { range: document.span(&key.value), color });
             }
@@ -25,7 +28,7 @@ pub(super) fn all(document: &Document) -> Value {
     json!(found)
 }
 
-/// A value as a colour; numbers above 1 are as bright as a screen is.
+/// A value as a color; numbers above 1 are as bright as a screen is.
 fn color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
         Some(text) => color_bytes(text)?,
@@ -45,7 +48,7 @@ fn color(text: &str, key: &OutlineKey) -> Option<Color> {
     Some(Color { red, green, blue, alpha: 1.0 })
 }
 
-/// A chosen colour as texts: `#rrggbb`, and linear numbers.
+/// A chosen color as texts: `#rrggbb`, and linear numbers.
 pub(super) fn presentations(params: &Value) -> Option<Value> {
     let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
     let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);

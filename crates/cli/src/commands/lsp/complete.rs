@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::document::Document;
 use super::look::{described, texture_keys};
 use super::place::{Place, Section, place};
-use crate::scene::keys::key::{Form, KeyInfo, Kind, Word};
+use crate::scene::keys::key::{Form, KeyInfo, ValueKind, Word};
 use crate::scene::keys::{color_names, tables};
 
 /// The candidates at a byte of the text. `None` if the text is nothing of a scene there.
@@ -96,7 +96,7 @@ fn types(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
     words(&list, is_quoted)
 }
 
-fn values(document: &Document, kind: Kind, is_quoted: bool) -> Vec<CompletionItem> {
+fn values(document: &Document, kind: ValueKind, is_quoted: bool) -> Vec<CompletionItem> {
     let texture = |more: &str| {
         item("{ texture = … }", CompletionItemKind::STRUCT, "", format!("{{ texture = \"\"{more} }}"))
     };
@@ -105,23 +105,25 @@ fn values(document: &Document, kind: Kind, is_quoted: bool) -> Vec<CompletionIte
         color_names().map(color).collect::<Vec<_>>()
     };
     match kind {
-        Kind::Words(list) => words(&list(), is_quoted),
-        Kind::Flag => {
+        ValueKind::Words(list) => words(&list(), is_quoted),
+        ValueKind::Flag => {
             ["true", "false"].map(|flag| item(flag, CompletionItemKind::VALUE, "", flag.to_owned())).to_vec()
         }
-        Kind::Material | Kind::Texture | Kind::Heights => {
+        ValueKind::Material | ValueKind::Texture | ValueKind::Heights => {
             kind.named_in().map_or_else(Vec::new, |table| names(document, table, is_quoted))
         }
-        Kind::Color(_) => colors(),
-        Kind::ColorOrTexture(_) | Kind::Emission(_) if is_quoted => colors(),
-        Kind::ColorOrTexture(_) | Kind::Emission(_) => colors().into_iter().chain([texture("")]).collect(),
-        Kind::NumberOrTexture(_) => vec![texture("")],
-        Kind::Whole(..)
-        | Kind::Number(_)
-        | Kind::Text
-        | Kind::File(_)
-        | Kind::Numbers(..)
-        | Kind::Scale(_) => Vec::new(),
+        ValueKind::Color(_) => colors(),
+        ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) if is_quoted => colors(),
+        ValueKind::ColorOrTexture(_) | ValueKind::Emission(_) => {
+            colors().into_iter().chain([texture("")]).collect()
+        }
+        ValueKind::NumberOrTexture(_) => vec![texture("")],
+        ValueKind::Whole(..)
+        | ValueKind::Number(_)
+        | ValueKind::Text
+        | ValueKind::File(_)
+        | ValueKind::Numbers(..)
+        | ValueKind::Scale(_) => Vec::new(),
     }
 }
 

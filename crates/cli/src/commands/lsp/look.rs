@@ -6,7 +6,7 @@ use lsp_types::{Hover, HoverContents, MarkupContent, MarkupKind};
 use serde_json::{Value, json};
 
 use super::document::Document;
-use crate::scene::keys::key::{Default, KeyInfo, Kind};
+use crate::scene::keys::key::{Default, KeyInfo, ValueKind};
 use crate::scene::outline::{OutlineKey, OutlineTable};
 
 /// A key under the cursor, with its table, and the key of the table if it is one in braces.
@@ -67,7 +67,7 @@ pub(super) fn described(key: &KeyInfo) -> String {
             Default::Required(_) | Default::Is(_) | Default::By(_) => key.default_words(),
         },
     );
-    if let Kind::Words(list) = key.kind {
+    if let ValueKind::Words(list) = key.kind {
         list().iter().for_each(|word| text.push_str(&format!("\n- `\"{}\"`: {}", word.name, word.meaning)));
     }
     text
@@ -78,7 +78,7 @@ pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
     [
         ("texture", "The name of a texture."),
         ("channel", "The channel that holds numbers: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
-        ("scale", "A colour that multiplies the texture, in `emission`."),
+        ("scale", "A color that multiplies the texture, in `emission`."),
     ]
 }
 

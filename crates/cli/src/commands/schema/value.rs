@@ -7,16 +7,16 @@ use crate::choice::Choice;
 use crate::math::limits::{LARGEST, SHORTEST};
 use crate::scene::description::Channel;
 use crate::scene::keys::color_names;
-use crate::scene::keys::key::Kind;
+use crate::scene::keys::key::ValueKind;
 use crate::scene::keys::limits::Limits;
 
 /// The schema of a kind of values.
-pub(super) fn value(kind: Kind, draft: Draft) -> Value {
+pub(super) fn value(kind: ValueKind, draft: Draft) -> Value {
     match kind {
-        Kind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
-        Kind::Number(limits) => number(limits, draft),
-        Kind::Flag => json!({ "type": "boolean" }),
-        Kind::Words(list) => {
+        ValueKind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
+        ValueKind::Number(limits) => number(limits, draft),
+        ValueKind::Flag => json!({ "type": "boolean" }),
+        ValueKind::Words(list) => {
             let words = list();
             let names: Vec<&str> = words.iter().map(|word| word.name).collect();
             let meanings: Vec<&str> = words.iter().map(|word| word.meaning).collect();
@@ -27,19 +27,19 @@ pub(super) fn value(kind: Kind, draft: Draft) -> Value {
             schema
         }
         // Shapes are also known by their numbers.
-        Kind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
-        Kind::File(endings) => file(endings),
-        Kind::Color(limits) => json!({ "anyOf": colors(limits, draft) }),
-        Kind::ColorOrTexture(limits) => any(colors(limits, draft), texture(json!({}))),
-        Kind::Emission(limits) => {
+        ValueKind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
+        ValueKind::File(endings) => file(endings),
+        ValueKind::Color(limits) => json!({ "anyOf": colors(limits, draft) }),
+        ValueKind::ColorOrTexture(limits) => any(colors(limits, draft), texture(json!({}))),
+        ValueKind::Emission(limits) => {
             let scale = json!({ "anyOf": colors(Limits::AtLeast(0.0), draft) });
             any(colors(limits, draft), texture(json!({ "scale": scale })))
         }
-        Kind::NumberOrTexture(limits) => any(vec![number(limits, draft)], channel()),
-        Kind::Numbers(count, _, limits) => numbers(count, limits, draft),
-        Kind::Scale(limits) => json!({ "anyOf": [number(limits, draft), numbers(3, limits, draft)] }),
-        Kind::Texture | Kind::Material => json!({ "type": "string", "minLength": 1 }),
-        Kind::Heights => any(vec![json!({ "type": "string", "minLength": 1 })], channel()),
+        ValueKind::NumberOrTexture(limits) => any(vec![number(limits, draft)], channel()),
+        ValueKind::Numbers(count, _, limits) => numbers(count, limits, draft),
+        ValueKind::Scale(limits) => json!({ "anyOf": [number(limits, draft), numbers(3, limits, draft)] }),
+        ValueKind::Texture | ValueKind::Material => json!({ "type": "string", "minLength": 1 }),
+        ValueKind::Heights => any(vec![json!({ "type": "string", "minLength": 1 })], channel()),
     }
 }
 
@@ -77,18 +77,18 @@ fn numbers(count: usize, limits: Limits, draft: Draft) -> Value {
     json!({ "type": "array", "items": number(limits, draft), "minItems": count, "maxItems": count })
 }
 
-/// The forms of a colour.
+/// The forms of a color.
 fn colors(limits: Limits, draft: Draft) -> Vec<Value> {
     let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
     vec![number(limits, draft), numbers(3, limits, draft), written]
 }
 
-/// A colour as a text.
+/// A color as a text.
 pub(super) fn written_color() -> Value {
     let mut names: Vec<&str> = color_names().collect();
     names.sort_unstable();
     json!({
-        "description": "An sRGB colour: `#rrggbb`, or the name that CSS has for it, in any case.",
+        "description": "An sRGB color: `#rrggbb`, or the name that CSS has for it, in any case.",
         "anyOf": [{ "enum": names }, { "type": "string", "pattern": color_pattern(&names) }],
     })
 }

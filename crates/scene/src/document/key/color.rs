@@ -1,4 +1,4 @@
-//! Colours, and colours or textures.
+//! Reads colors and textures.
 
 use std::ops::Range;
 
@@ -8,36 +8,36 @@ use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::Names;
-use super::super::value::{Item, Value, limited, whole, wrong_type};
-use super::Key;
+use super::super::value::{TomlValue, Value, limited, whole, wrong_type};
+use super::TableKey;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec3};
 
-const COLOR: &str = "a colour: [r, g, b], a number, \"#rrggbb\" or a name";
-/// Nobody means a surface by such a number that reflects as many times what falls on it.
-const LEAST_BYTE: u8 = 10;
+const COLOR: &str = "a color: [r, g, b], a number, \"#rrggbb\" or a name";
+/// Integers from this one on are taken for a component in 0–255: no reflectance is this large.
+const MIN_BYTE: u8 = 10;
 const COLOR_OR_TEXTURE: &str =
-    "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
+    "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
 const EMISSION: &str =
-    "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
+    "a color, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
-impl Key<'_> {
-    /// A colour ≥ 0, decoded to linear.
+impl TableKey<'_> {
+    /// A non-negative color, decoded to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
         self.exact_color(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
     }
 
-    /// A colour as it is written: a part so small or so near to 1 that `f32` does not tell it from that.
+    /// A color in double precision, for values that `f32` would round to 0 or 1.
     pub(in super::super) fn exact_color(&self, limits: Limits) -> Option<DVec3> {
         self.color_of(limits, COLOR)
     }
 
-    /// A colour or a texture.
+    /// A color or a texture.
     pub(in super::super) fn color_or_texture(&self, textures: &Names, limits: Limits) -> Option<ColorSource> {
         if self.is_table() {
             return self.texture(textures).map(ColorSource::Texture);
         }
-        self.is_no_texture(textures, COLOR_OR_TEXTURE)?;
+        self.reject_texture_name(textures, COLOR_OR_TEXTURE)?;
         self.color_of(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
     }
 
@@ -49,7 +49,7 @@ impl Key<'_> {
         texture
     }
 
-    /// Radiance: a colour ≥ 0, or a texture and what that is multiplied by.
+    /// Emitted radiance: a non-negative color, or a texture with a scale.
     pub(in super::super) fn emission(&self, textures: &Names) -> Option<EmissionSource> {
         if self.is_table() {
             let table = self.inline_table()?;
@@ -59,13 +59,13 @@ impl Key<'_> {
             table.finish();
             return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::constant(scale?) });
         }
-        self.is_no_texture(textures, EMISSION)?;
+        self.reject_texture_name(textures, EMISSION)?;
         self.color_of(Limits::AtLeast(0.0), EMISSION).map(|color| EmissionSource::constant(color.as_vec3()))
     }
 
-    /// None, and an error, where a value is the bare name of a texture.
-    fn is_no_texture(&self, textures: &Names, expected: &str) -> Option<()> {
-        if let Item::String(text) = self.value?.item()
+    /// Returns `None` and reports an error if the value is a bare texture name.
+    fn reject_texture_name(&self, textures: &Names, expected: &str) -> Option<()> {
+        if let TomlValue::String(text) = self.value?.item()
             && color_bytes(text).is_none()
             && textures.find(text).is_some()
         {
@@ -81,16 +81,16 @@ impl Key<'_> {
     fn color_of(&self, limits: Limits, expected: &str) -> Option<DVec3> {
         let value = self.value?;
         if let Limits::Between(..) = limits
-            && self.is_of_bytes(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
+            && self.reports_bytes(|span| Issue::error(span, format!("`{}` must be {COLOR}", self.name)))
         {
             return None;
         }
         match value.item() {
-            Item::String(text) => return self.written_color(text).map(Vec3::as_dvec3),
-            Item::Integer { .. } | Item::Float(_) => {
+            TomlValue::String(text) => return self.parse_color(text).map(Vec3::as_dvec3),
+            TomlValue::Integer { .. } | TomlValue::Float(_) => {
                 return limited(self.context, self.name, value, limits, expected).map(DVec3::splat);
             }
-            Item::Boolean(_) | Item::Datetime | Item::Array(_) | Item::Table(_) => {}
+            TomlValue::Boolean(_) | TomlValue::Datetime | TomlValue::Array(_) | TomlValue::Table(_) => {}
         }
         if value.array().is_some_and(|array| array.len() == 3) {
             let rgb: [f64; 3] = self.numbers(limits, "three numbers, [r, g, b]")?;
@@ -100,37 +100,36 @@ impl Key<'_> {
         None
     }
 
-    /// Whether its value is numbers from 0 to 255 in place of parts of the light; then reports this issue of its place, with
-    /// the text that is meant.
-    pub(in super::super) fn is_of_bytes(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
-        let (Some(span), Some(color)) = (self.span(), self.of_bytes()) else { return false };
-        let help = format!("write \"{color}\"; parts of the light go from 0 to 1");
+    /// Whether the value looks like a color in 0–255. If so, reports `issue` for its span, with the equivalent `#rrggbb`.
+    pub(in super::super) fn reports_bytes(&self, issue: impl FnOnce(Range<usize>) -> Issue) -> bool {
+        let (Some(span), Some(color)) = (self.span(), self.as_hex()) else { return false };
+        let help = format!("write \"{color}\"; linear components range from 0 to 1");
         self.context.report(issue(span).label("this looks like 0–255").help(help));
         true
     }
 
-    /// The text `#rrggbb` for one or three whole numbers up to 255 of which one is too large for a part of the light.
-    fn of_bytes(&self) -> Option<String> {
+    /// The string `#rrggbb` for one or three integers up to 255, if one of them is too large for a linear component.
+    fn as_hex(&self) -> Option<String> {
         let byte = |value: Value<'_>| match value.item() {
-            Item::Integer { digits, radix } => u8::try_from(whole(digits, radix)?).ok(),
-            Item::String(_)
-            | Item::Float(_)
-            | Item::Boolean(_)
-            | Item::Datetime
-            | Item::Array(_)
-            | Item::Table(_) => None,
+            TomlValue::Integer { digits, radix } => u8::try_from(whole(digits, radix)?).ok(),
+            TomlValue::String(_)
+            | TomlValue::Float(_)
+            | TomlValue::Boolean(_)
+            | TomlValue::Datetime
+            | TomlValue::Array(_)
+            | TomlValue::Table(_) => None,
         };
         let value = self.value?;
         let bytes: Vec<u8> = match value.array() {
             Some(array) => array.iter().map(byte).collect::<Option<_>>()?,
             None => vec![byte(value)?; 3],
         };
-        let is_meant = bytes.len() == 3 && bytes.iter().any(|byte| *byte >= LEAST_BYTE);
+        let is_meant = bytes.len() == 3 && bytes.iter().any(|byte| *byte >= MIN_BYTE);
         is_meant.then(|| bytes.iter().fold("#".to_owned(), |text, byte| format!("{text}{byte:02x}")))
     }
 
-    /// `#rrggbb`, or a name in any case, decoded from sRGB.
-    fn written_color(&self, text: &str) -> Option<Vec3> {
+    /// Decodes `#rrggbb` or a case-insensitive color name from sRGB.
+    fn parse_color(&self, text: &str) -> Option<Vec3> {
         if let Some(bytes) = color_bytes(text) {
             return Some(srgb8_to_linear(bytes));
         }
@@ -138,20 +137,20 @@ impl Key<'_> {
         let small = text.to_ascii_lowercase();
         let issue = match (long_form(text), nearest(&small, color_names())) {
             (Some(long), _) => {
-                issue.label("this is not #rrggbb").help(format!("write all six digits: \"{long}\""))
+                issue.label("not of the form #rrggbb").help(format!("write all six digits: \"{long}\""))
             }
             (None, _) if text.starts_with('#') => issue
-                .label("this is not #rrggbb")
-                .help("six hexadecimal digits after a #, such as \"#ffcc00\""),
+                .label("not of the form #rrggbb")
+                .help("write six hexadecimal digits after the #, such as \"#ffcc00\""),
             (None, Some(near)) => issue.label(format!("did you mean \"{near}\"?")),
-            (None, None) => issue.label("there is no colour of this name").help("the names are those of CSS"),
+            (None, None) => issue.label("unknown color name").help("use a CSS color name"),
         };
         self.context.report(issue);
         None
     }
 }
 
-/// `#rrggbb` for `#rgb` and for `rrggbb`.
+/// Converts `#rgb` and `rrggbb` to `#rrggbb`.
 fn long_form(text: &str) -> Option<String> {
     match hex_digits(text) {
         Some(digits) if digits.len() == 3 => {
@@ -167,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn short_and_bare_digits_lead_to_the_long_form() {
+    fn short_and_bare_hex_colors_are_completed() {
         assert_eq!(long_form("#f80").as_deref(), Some("#ff8800"));
         assert_eq!(long_form("ff8000").as_deref(), Some("#ff8000"));
         assert_eq!(long_form("red"), None);

@@ -1,27 +1,25 @@
-//! Files that the scene names.
+//! Reads paths of files.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use super::super::super::description::Located;
 use super::super::super::nearest::nearest;
-use super::super::super::read::{MOST_FILES, is_link, neighbour};
+use super::super::super::read::{MAX_FOLDER_FILES, is_link, neighbor};
 use super::super::super::sanitize::{shortened, visible};
 use super::super::context::Issue;
-use super::Key;
+use super::TableKey;
 use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
-impl Key<'_> {
-    /// An existing file with one of these endings (none given: any), resolved against the scene's folder.
+impl TableKey<'_> {
+    /// An existing file with one of these extensions (any if empty), resolved against the scene's folder.
     pub(in super::super) fn file(&self, endings: &[&str]) -> Option<Located<PathBuf>> {
         let text = self.text("the path of a file")?;
         let span = self.span()?;
         if text.is_empty() {
-            self.context.report(Issue::error(
-                span,
-                format!("`{}` is empty: it must be the path of a file", self.name),
-            ));
+            self.context
+                .report(Issue::error(span, format!("`{}` is empty; expected the path of a file", self.name)));
             return None;
         }
         if !endings.is_empty() && !self.has_ending(text, endings) {
@@ -32,7 +30,7 @@ impl Key<'_> {
             |found: &Path| endings.is_empty() || endings.contains(&ending(&found.to_string_lossy()).as_str());
         if let Err((message, is_missing)) = regular_file(&path) {
             let help = is_missing.then(|| {
-                match self.context.search(MOST_FILES, || neighbour(&path, may_be_meant)) {
+                match self.context.search(MAX_FOLDER_FILES, || neighbor(&path, may_be_meant)) {
                     Some(near) => format!("did you mean {}?", visible(&as_written(text, &near))),
                     None => "paths are relative to the scene file".to_owned(),
                 }
@@ -43,7 +41,7 @@ impl Key<'_> {
         Some(Located { value: path, span })
     }
 
-    /// Whether a path ends as it should; an error if not.
+    /// Checks the extension of a path, and reports an error if it is wrong.
     pub(in super::super) fn has_ending(&self, text: &str, endings: &[&str]) -> bool {
         let ending = ending(text);
         if endings.contains(&ending.as_str()) {
@@ -53,8 +51,8 @@ impl Key<'_> {
         let list = endings.iter().map(|ending| format!(".{ending}")).collect::<Vec<_>>().join(", ");
         let shown = shortened(&ending, 16);
         let message = match ending.as_str() {
-            "" => format!("`{}` needs a file ending that says its format", self.name),
-            _ => format!("`{}`: unknown file ending .{shown}", self.name),
+            "" => format!("`{}` needs a file extension", self.name),
+            _ => format!("`{}`: unknown file extension .{shown}", self.name),
         };
         let mut issue = Issue::error(span, message).help(format!("expected one of {list}"));
         if let Some(near) = nearest(&ending, endings.iter().copied()) {
@@ -65,18 +63,18 @@ impl Key<'_> {
     }
 }
 
-/// A file beside one that the scene names, as the scene is to name it: relative to the scene's folder, not to the caller's.
+/// The path of a suggested file as it would be written in the scene, relative to the scene's folder.
 fn as_written(text: &str, near: &Path) -> String {
     let name = near.file_name().unwrap_or(near.as_os_str());
     Path::new(text).with_file_name(name).to_string_lossy().into_owned()
 }
 
-/// Ending of a path after its last dot, in small letters; may be empty.
+/// The extension of a path in lower case, possibly empty.
 fn ending(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
 }
 
-/// The reason why a file cannot be used, and whether the reason is that it does not exist.
+/// Checks that a file is regular. The error has a message and whether the file is missing.
 fn regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
     match file::kind(path) {
@@ -86,7 +84,7 @@ fn regular_file(path: &Path) -> Result<(), (String, bool)> {
             Err((format!("{shown} is a symbolic link to a file that does not exist"), false))
         }
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            Err((format!("there is no file {shown}"), true))
+            Err((format!("file not found: {shown}"), true))
         }
         Err(error) => Err((format!("cannot read {shown}: {}", describe_error(&error)), false)),
     }
@@ -97,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_neighbour_is_called_as_the_scene_has_to_call_it() {
+    fn suggestions_are_relative_to_the_scene() {
         let near = Path::new("scenes/../assets/textures/bricks.png");
         assert_eq!(as_written("../assets/textures/brick.png", near), "../assets/textures/bricks.png");
         assert_eq!(as_written("brick.png", Path::new("scenes/bricks.png")), "bricks.png");

@@ -1,17 +1,17 @@
-//! Numbers or textures.
+//! Reads numbers and textures of numbers.
 
 use super::super::super::description::{Channel, NumberSource};
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::Names;
-use super::super::value::{Item, limited};
-use super::Key;
+use super::super::value::{TomlValue, limited};
+use super::TableKey;
 
 const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
 const NAME_OR_TEXTURE: &str = "the name of a texture, or { texture = \"name\" }";
 
-impl Key<'_> {
-    /// A number or a texture of numbers, perhaps with the channel that holds them.
+impl TableKey<'_> {
+    /// A number, or a texture with an optional channel.
     pub(in super::super) fn number_or_texture(
         &self,
         textures: &Names,
@@ -22,7 +22,7 @@ impl Key<'_> {
             return Some(NumberSource::Texture { texture, channel });
         }
         let value = self.value?;
-        if let Item::String(text) = value.item()
+        if let TomlValue::String(text) = value.item()
             && textures.find(text).is_some()
         {
             let issue = Issue::error(value.span(), format!("`{}` must be {NUMBER_OR_TEXTURE}", self.name))
@@ -35,7 +35,7 @@ impl Key<'_> {
         number.map(|number| NumberSource::Constant(number as f32))
     }
 
-    /// The name of a texture of numbers, or `{ texture = "name", channel = "r" }`.
+    /// The name of a texture, or `{ texture = "name", channel = "r" }`.
     pub(in super::super) fn texture_of_numbers(&self, textures: &Names) -> Option<(usize, Option<Channel>)> {
         if self.is_table() {
             return self.texture_with_channel(textures);

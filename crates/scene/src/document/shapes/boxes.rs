@@ -2,10 +2,10 @@
 
 use super::super::super::description::Shape;
 use super::super::limits::Limits;
-use super::super::table::Table;
+use super::super::table::TableReader;
 use crate::math::DVec3;
 
-pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let center = table.optional("center").vector_or(Limits::Any, DVec3::new(0.0, 0.5, 0.0));
     let size = table.optional("size").vector(table.limits("size")).unwrap_or(DVec3::ONE);
     let rotate = table.optional("rotate").vector(Limits::Any).unwrap_or(DVec3::ZERO);

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use super::super::super::description::{Located, Mesh, MeshFile, Placement, Shape};
 use super::super::super::keys::endings::{GLTF, MESHES};
 use super::super::context::Issue;
-use super::super::key::Key;
+use super::super::key::TableKey;
 use super::super::limits::Limits;
-use super::super::table::Table;
+use super::super::table::TableReader;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 
-/// The mesh files named so far, each once, however it is written.
+/// The mesh files referenced so far, without duplicates even if their paths are written differently.
 #[derive(Default)]
 pub(super) struct MeshFiles {
     list: Vec<MeshFile>,
@@ -34,7 +34,7 @@ impl MeshFiles {
     }
 }
 
-pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
+pub(super) fn read(table: &TableReader<'_>, files: &mut MeshFiles) -> Option<Shape> {
     let file = table.required("file", "\"mesh.obj\"").file(MESHES);
     let part = part(table, file.as_ref());
     let placed = placement(table);
@@ -43,27 +43,27 @@ pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
     Some(Shape::Mesh(Mesh { file: files.index(file?, part?), placed: placed?, smooth, vertex_colors }))
 }
 
-/// The number of a part, which glTF files have.
-fn part(table: &Table<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
+/// Reads the number of a part of a glTF file.
+fn part(table: &TableReader<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional("part");
     let Some(span) = key.span() else { return Some(None) };
     let number = key.whole(table.range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
-        key.context.report(Issue::error(span, "`part` is for .glb and .gltf files: others have no parts"));
+        key.context.report(Issue::error(span, "`part` needs a .glb or .gltf file"));
         return None;
     }
     number
 }
 
 /// `matrix`, or `scale`, `rotate` and `translate`.
-fn placement(table: &Table<'_>) -> Option<Placement> {
+fn placement(table: &TableReader<'_>) -> Option<Placement> {
     let (matrix, steps) =
         (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));
     if matrix.is_given() {
         for key in &steps {
             if let Some(span) = key.key_span() {
-                let message = format!("`{}` and `matrix` exclude each other", key.name);
+                let message = format!("`{}` conflicts with `matrix`", key.name);
                 key.context.report(Issue::error(span, message));
             }
         }
@@ -77,11 +77,12 @@ fn placement(table: &Table<'_>) -> Option<Placement> {
     })
 }
 
-/// Least ratio of the volume of a cell that a matrix makes to that of the box of its edges: below, it is flat but for rounding.
-const LEAST_VOLUME: f64 = 1e-12;
+/// Smallest ratio of a matrix's determinant to the product of its column lengths. Below it, the matrix is singular up to
+/// rounding.
+const MIN_VOLUME_RATIO: f64 = 1e-12;
 
-/// An affine map that flattens nothing, row by row.
-fn affine(key: &Key<'_>) -> Option<Placement> {
+/// Reads an invertible affine map, row by row.
+fn affine(key: &TableKey<'_>) -> Option<Placement> {
     let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
     let [x, y, z, translate] =
         std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
@@ -94,8 +95,8 @@ fn affine(key: &Key<'_>) -> Option<Placement> {
         return wrong("the last row of `matrix` must be 0, 0, 0, 1", format!("it is {a}, {b}, {c}, {d}"));
     }
     let (volume, edges) = (x.cross(y).dot(z), x.length() * y.length() * z.length());
-    if !(volume.abs() > LEAST_VOLUME * edges) {
-        return wrong("`matrix` makes the mesh flat", format!("its determinant is {volume:e}"));
+    if !(volume.abs() > MIN_VOLUME_RATIO * edges) {
+        return wrong("`matrix` is not invertible", format!("its determinant is {volume:e}"));
     }
     if [x, y, z].iter().any(|axis| is_too_short(length(*axis))) {
         return wrong(

@@ -1,4 +1,4 @@
-//! Shapes: a file for each kind of table.
+//! Reads shapes, with one file per kind.
 
 mod boxes;
 mod cone;
@@ -17,16 +17,16 @@ use super::super::description::{MeshFile, Object, Shape};
 use super::super::keys::endings::MESHES;
 use super::context::Issue;
 use super::limits::Limits;
-use super::materials::Materials;
-use super::table::Table;
+use super::materials::MaterialList;
+use super::table::TableReader;
 use crate::math::DVec3;
 use mesh::MeshFiles;
 
-/// Reader of a shape's table; only meshes touch the list of files.
-type Reader = fn(&Table<'_>, &mut MeshFiles) -> Option<Shape>;
+/// Reads the table of a shape. Only meshes use the list of files.
+type ShapeReader = fn(&TableReader<'_>, &mut MeshFiles) -> Option<Shape>;
 
-/// The kinds; the description has the shapes in the order of the file.
-const KINDS: [(&str, Reader); 10] = [
+/// The kinds of shapes. [`read`] sorts the objects by file order.
+const KINDS: [(&str, ShapeReader); 10] = [
     ("sphere", |table, _| sphere::read(table)),
     ("quad", |table, _| quad::read(table)),
     ("plane", |table, _| plane::read(table)),
@@ -39,33 +39,33 @@ const KINDS: [(&str, Reader); 10] = [
     ("mesh", mesh::read),
 ];
 
-/// Whether a list of tables of this name is of shapes.
+/// Whether `[[name]]` is a shape.
 pub(super) fn is_kind(name: &str) -> bool {
     KINDS.iter().any(|(kind, _)| *kind == name)
 }
 
-/// Every shape of the file, and the mesh files they name; no shapes if one of them is wrong.
-pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Object>>, Vec<MeshFile>) {
+/// Reads all shapes and the mesh files that they reference. Returns no shapes if one is invalid.
+pub(super) fn read(root: &TableReader<'_>, materials: &MaterialList) -> (Option<Vec<Object>>, Vec<MeshFile>) {
     let mut files = MeshFiles::default();
     let mut objects = Vec::new();
-    let mut is_right = true;
+    let mut is_valid = true;
     for (kind, reader) in KINDS {
         for table in root.tables(kind) {
             match object(kind, &table, reader, materials, &mut files) {
                 Some(object) => objects.push(object),
-                None => is_right = false,
+                None => is_valid = false,
             }
         }
     }
     objects.sort_by_key(|object| object.span.start);
-    (is_right.then_some(objects), files.into_list())
+    (is_valid.then_some(objects), files.into_list())
 }
 
 fn object(
     kind: &str,
-    table: &Table<'_>,
-    reader: Reader,
-    materials: &Materials,
+    table: &TableReader<'_>,
+    reader: ShapeReader,
+    materials: &MaterialList,
     files: &mut MeshFiles,
 ) -> Option<Object> {
     let shape = reader(table, files);
@@ -77,9 +77,9 @@ fn object(
     let name = table.optional("name").shape_name();
     table.finish();
     if kind == "plane" && material.is_some_and(|index| materials.is_emissive(index)) {
-        let issue = Issue::error(key.span()?, "an infinite plane cannot be a light")
+        let issue = Issue::error(key.span()?, "an infinite plane cannot emit light")
             .label("this material has `emission`")
-            .help("use a [[quad]], which has an area, or a material without emission");
+            .help("use a [[quad]] or a material without emission");
         table.context.report(issue);
         return None;
     }
@@ -90,8 +90,13 @@ fn object(
     Some(Object { shape, material, name: name?, span: table.span.clone() })
 }
 
-/// A direction of any length but 0; `what` is wrong without it.
-pub(super) fn direction(table: &Table<'_>, name: &'static str, what: &str, default: DVec3) -> Option<DVec3> {
+/// Reads a direction of any nonzero length. Errors name the shape or light `what`.
+pub(super) fn direction(
+    table: &TableReader<'_>,
+    name: &'static str,
+    what: &str,
+    default: DVec3,
+) -> Option<DVec3> {
     let key = table.optional(name);
     let direction = key.vector_or(Limits::Any, default)?;
     if !key.is_long(direction) {
@@ -99,16 +104,16 @@ pub(super) fn direction(table: &Table<'_>, name: &'static str, what: &str, defau
     }
     if direction == DVec3::ZERO {
         let issue = Issue::error(key.span()?, format!("the {what} has no direction"))
-            .label(format!("`{name}` is of length 0"))
-            .help("any other length will do, such as [0, 1, 0] for upwards");
+            .label(format!("`{name}` has length 0"))
+            .help("use any nonzero vector, such as [0, 1, 0] for up");
         table.context.report(issue);
         return None;
     }
     Some(direction)
 }
 
-/// The ends of an axis, by default from the origin one unit upwards.
-fn axis_ends(table: &Table<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
+/// Reads the ends of an axis, by default (0, 0, 0) and (0, 1, 0).
+fn axis_ends(table: &TableReader<'_>, names: [&'static str; 2], what: &str) -> Option<[DVec3; 2]> {
     let keys = names.map(|name| table.optional(name));
     let (first, second) =
         (keys[0].vector_or(Limits::Any, DVec3::ZERO), keys[1].vector_or(Limits::Any, DVec3::Y));
@@ -121,29 +126,29 @@ fn axis_ends(table: &Table<'_>, names: [&'static str; 2], what: &str) -> Option<
         let [from, to] = names;
         let issue = Issue::error(span, format!("the {what} has no length"))
             .label(format!("`{from}` and `{to}` are the same point"))
-            .help(format!("without them, `{from}` is [0, 0, 0] and `{to}` [0, 1, 0]"));
+            .help(format!("the defaults are `{from} = [0, 0, 0]` and `{to} = [0, 1, 0]`"));
         table.context.report(issue);
         return None;
     }
     Some([first, second])
 }
 
-/// A length by its key or else a default.
-fn length(table: &Table<'_>, name: &'static str, default: f64) -> Option<f64> {
+/// Reads a length, or returns the default.
+fn length(table: &TableReader<'_>, name: &'static str, default: f64) -> Option<f64> {
     let key = table.optional(name);
     if key.is_given() { key.number(table.limits(name)) } else { Some(default) }
 }
 
-/// Whether two edges span an area: neither is 0, and the sine of the angle between them is not lost to rounding.
+/// Whether two edges span an area: both are nonzero, and the sine of their angle exceeds rounding errors.
 fn span_area(u: DVec3, v: DVec3) -> bool {
-    const PARALLEL: f64 = 1e-10;
+    const MIN_SINE: f64 = 1e-10;
     match (u.try_normalize(), v.try_normalize()) {
-        (Some(u), Some(v)) => u.cross(v).length() > PARALLEL,
+        (Some(u), Some(v)) => u.cross(v).length() > MIN_SINE,
         _ => false,
     }
 }
 
-/// Whether a file is a mesh by its name, of any version of glimt.
+/// Whether a file has a mesh extension.
 pub(crate) fn is_mesh(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     MESHES.iter().any(|known| *known == ending)

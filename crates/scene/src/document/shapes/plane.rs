@@ -2,11 +2,11 @@
 
 use super::super::super::description::Shape;
 use super::super::limits::Limits;
-use super::super::table::Table;
+use super::super::table::TableReader;
 use super::direction;
 use crate::math::DVec3;
 
-pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let point = table.optional("point").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     Some(Shape::Plane { point, normal: direction(table, "normal", "plane", DVec3::Y)? })
 }

@@ -1,13 +1,14 @@
 //! `[[quad]]`.
 
 use super::super::super::description::Shape;
+use super::super::NO_AREA;
 use super::super::context::Issue;
 use super::super::limits::Limits;
-use super::super::table::Table;
+use super::super::table::TableReader;
 use super::span_area;
 use crate::math::DVec3;
 
-pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let (u_key, v_key) = (table.optional("u"), table.optional("v"));
     let corner = table.optional("corner").vector_or(Limits::Any, DVec3::new(-1.0, 0.0, 1.0));
     let u = u_key.vector_or(Limits::Any, DVec3::new(2.0, 0.0, 0.0));
@@ -19,9 +20,9 @@ pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
     if !span_area(u, v) {
         let wrong = if u == DVec3::ZERO { u_key.span() } else { v_key.span() };
         let span = wrong.or(u_key.span())?;
-        let issue = Issue::error(span, "the quad has no area")
+        let issue = Issue::error(span, format!("the quad {NO_AREA}"))
             .label("`u` and `v` are parallel, or one of them is 0")
-            .help("`u` and `v` are two edges from the corner, in different directions");
+            .help("give two edges in different directions");
         table.context.report(issue);
         return None;
     }

@@ -3,24 +3,21 @@
 use super::super::super::description::Shape;
 use super::super::context::Issue;
 use super::super::limits::Limits;
-use super::super::table::Table;
+use super::super::table::TableReader;
 use super::{direction, length};
 use crate::math::DVec3;
 
-/// A tube as wide as the circle is refused: its surface would run through itself, with a second skin inside and no side
-/// that is the front of both.
-pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+/// Reads a torus. Rejects self-intersecting ones, whose surface has no consistent front side.
+pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let center = table.optional("center").vector(Limits::Any).unwrap_or(DVec3::ZERO);
     let axis = direction(table, "axis", "torus", DVec3::Y);
     let radius = length(table, "radius", 0.5);
     let tube = length(table, "tube", radius.unwrap_or(0.5) / 4.0);
     let (radius, tube) = (radius?, tube?);
     if tube >= radius {
-        let issue = Issue::error(table.optional("tube").span()?, "the torus runs through itself")
-            .label(format!("`tube` must be less than `radius`, which is {radius}"))
-            .help(
-                "`radius` goes from the centre to the middle of the tube, `tube` from there to the surface",
-            );
+        let issue = Issue::error(table.optional("tube").span()?, "the torus intersects itself")
+            .label(format!("`tube` must be less than `radius` = {radius}"))
+            .help("`radius` is measured to the middle of the tube, `tube` from there to the surface");
         table.context.report(issue);
         return None;
     }

@@ -1,17 +1,18 @@
 //! `[[triangle]]`.
 
 use super::super::super::description::Shape;
+use super::super::NO_AREA;
 use super::super::context::Issue;
-use super::super::key::Key;
+use super::super::key::TableKey;
 use super::super::limits::Limits;
-use super::super::table::Table;
+use super::super::table::TableReader;
 use super::span_area;
 use crate::math::DVec3;
 
-/// Corners of a triangle that has none.
+/// Default corners.
 const CORNERS: [DVec3; 3] = [DVec3::ZERO, DVec3::X, DVec3::Y];
 
-pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
+pub(super) fn read(table: &TableReader<'_>) -> Option<Shape> {
     let keys = ["a", "b", "c"].map(|name| table.optional(name));
     let [a, b, c] = [0, 1, 2].map(|i| keys[i].vector_or(Limits::Any, CORNERS[i]));
     let (a, b, c) = (a?, b?, c?);
@@ -20,10 +21,10 @@ pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
         return None;
     }
     if !span_area(b - a, c - a) {
-        let span = keys.iter().rev().find_map(Key::span)?;
-        let issue = Issue::error(span, "the triangle has no area")
-            .label("`a`, `b` and `c` are on one line")
-            .help("give three points that are not on a line");
+        let span = keys.iter().rev().find_map(TableKey::span)?;
+        let issue = Issue::error(span, format!("the triangle {NO_AREA}"))
+            .label("`a`, `b` and `c` are collinear")
+            .help("give three points that are not collinear");
         table.context.report(issue);
         return None;
     }
