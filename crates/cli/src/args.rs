@@ -1,4 +1,4 @@
-//! Arguments of the command line.
+//! Command-line arguments.
 
 mod bench;
 pub(crate) mod candidates;
@@ -14,7 +14,7 @@ use clap::builder::styling::{AnsiColor, Styles};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 pub use self::bench::BenchArgs;
-pub use self::parts::{Engine, FarmArgs, MergeArgs};
+pub use self::parts::{FarmArgs, MergeArgs, Scheduler};
 use crate::choice;
 use crate::choice::Choice;
 use crate::console::answer_columns;
@@ -26,44 +26,42 @@ use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
-/// Example calls and their effects. No line is wider than a narrow terminal.
+/// Examples for the long help and the manual page. Lines fit 80 columns.
 pub(super) const EXAMPLES: &str = "  \
-  glimt new ball.toml                     write a scene to start from
-  glimt ball.toml                         edit it in an editor and see it here
+  glimt new ball.toml                     write a commented scene
+  glimt ball.toml                         render it live while you edit it
   glimt ball.toml --once -o a.png -o a.exr
   glimt ball.toml --once --samples 16 --time 2 --report report.json
-  glimt check ball.toml                   find errors without rendering
-  glimt explain materials.metal.roughness what a key means
-  glimt helmet.glb                        show a model: obj, off, ply, stl, gltf
+  glimt check ball.toml                   report errors without rendering
+  glimt explain materials.metal.roughness describe a key
+  glimt helmet.glb                        view a model: obj, off, ply, stl, gltf
   glimt helmet.glb --once --turntable 36 -o helmet.gif
-  glimt import helmet.glb -o helmet.toml  make a scene of it, to edit
+  glimt import helmet.glb -o helmet.toml  convert it to an editable scene
   glimt compare a.exr reference.exr       measure the error of an image
-  glimt bench ball.toml --plot plot.svg   plot the error of each method over time
+  glimt bench ball.toml --plot plot.svg   plot the error of each method
   glimt ball.toml --once -o 1.part --shard 1/2    render the first half
-  glimt merge a.png 1.part 2.part         join both halves
+  glimt merge a.png 1.part 2.part         merge both halves
 
-The scene that `glimt new` writes has every key, with comments. \
-A scene that is named like a command is given with its folder: glimt ./check";
+`glimt new` writes a scene with every key, commented. \
+If a scene is named like a command, add its folder: glimt ./check";
 
 /// Exit codes of all commands.
 pub(super) const EXIT_CODES: &str = "\
-0 done; 1 the work failed; 2 the call or the scene is wrong; \
-130, 143, 129 ended by SIGINT, SIGTERM, SIGHUP.";
+0 success; 1 failure; 2 invalid arguments or scene; \
+130, 143 or 129 terminated by SIGINT, SIGTERM or SIGHUP.";
 
-/// Width of the help in columns: the terminal's, or 80. `COLUMNS` overrides them.
+/// Width of the help in columns: `COLUMNS`, or the terminal's width, or 80.
 fn help_columns() -> usize {
-    let asked = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
-    asked.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)
+    let columns = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    columns.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)
 }
+
+/// Text after the options of `-h`.
+const AFTER_HELP: &str = "Run `glimt --help` for details and examples.";
 
 /// Text after the options of `--help`.
 fn after_long_help() -> String {
-    format!("{}\n\n{}", after_help(), environment::section())
-}
-
-/// Text after the options.
-fn after_help() -> String {
-    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}")
+    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}\n\n{}", environment::section())
 }
 
 const STYLES: Styles = Styles::styled()
@@ -74,7 +72,7 @@ const STYLES: Styles = Styles::styled()
 
 /// A ray tracer that lives in the terminal: edit a scene, save it, see it.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "glimt", version = crate::pipeline::BUILD, after_help = after_help(), after_long_help = after_long_help(), styles = STYLES)]
+#[command(name = "glimt", version = crate::pipeline::BUILD, after_help = AFTER_HELP, after_long_help = after_long_help(), styles = STYLES)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, term_width = help_columns())]
 pub struct Args {
     /// A command other than rendering.
@@ -86,7 +84,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// The colours asked for, by whatever command.
+    /// The color option of the command.
     pub(super) fn color(&self) -> ColorChoice {
         match &self.command {
             Some(Subcommand::Check { color, .. }) => *color,
@@ -113,98 +111,100 @@ impl Args {
 /// Commands other than rendering.
 #[derive(Clone, Debug, clap::Subcommand)]
 pub enum Subcommand {
-    /// Read and validate a scene and everything that it names; render nothing
+    /// Validate a scene and its files without rendering
     Check {
         /// The scene file
         #[arg(add = candidates::scenes())]
         scene: PathBuf,
-        /// Another value for a key of the scene, as in a render
+        /// Override a scene key
         #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
-        /// One JSON object on stdout, with a list of what is wrong, in place of messages
+        /// Print errors and warnings as one JSON object on stdout
         #[arg(long)]
         json: bool,
-        /// Colours of the messages
-        #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+        /// Colors: auto, truecolor, 256, 16, none
+        #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
         color: ColorChoice,
     },
-    /// Write a commented scene to start from; refuses to overwrite
+    /// Write a commented scene to start from; never overwrites a file
     New {
-        /// The file to write; - is stdout
+        /// The file to write, or - for stdout
         file: PathBuf,
-        /// Begin it with a line that leads an editor to the schema, and write that beside it
+        /// Reference the JSON Schema in the scene, and write it next to the scene
         #[arg(long)]
         schema: bool,
     },
-    /// Make a scene of a glTF file, with its meshes as PLY files and its images beside it; refuses to overwrite
-    #[command(after_help = IMPORT_HELP)]
+    /// Convert a glTF file to a scene; never overwrites a file
+    ///
+    /// Meshes (as PLY files) and images are written to a folder next to the scene.
+    #[command(after_long_help = IMPORT_HELP)]
     Import(ImportArgs),
-    /// Say how a picture was made: the settings that a file carries
-    #[command(after_help = INFO_HELP)]
+    /// Show the settings that an image was rendered with
+    #[command(after_long_help = INFO_HELP)]
     Info(InfoArgs),
-    /// Measure the error of a picture against a reference
-    #[command(after_help = COMPARE_HELP)]
+    /// Measure the error of an image against a reference
+    #[command(after_long_help = COMPARE_HELP)]
     Compare(CompareArgs),
-    /// Benchmark error against time: the error of methods against their seconds, over several seeds
-    #[command(after_help = bench::HELP)]
+    /// Measure the error of rendering methods against their time
+    #[command(after_long_help = bench::HELP)]
     Bench(Box<BenchArgs>),
-    /// Join the parts of a picture that --shard wrote
-    #[command(after_help = parts::MERGE_HELP)]
+    /// Merge the parts of an image rendered with --shard
+    #[command(after_long_help = parts::MERGE_HELP)]
     Merge(MergeArgs),
-    /// Print the job script that renders a picture in parts on several machines
-    #[command(after_help = parts::FARM_HELP)]
+    /// Print a job script that renders an image on several machines
+    #[command(after_long_help = parts::FARM_HELP)]
     Farm(Box<FarmArgs>),
-    /// Print the script that makes a shell complete commands, options, scenes and the keys of --set
-    #[command(after_help = COMPLETIONS_HELP)]
+    /// Print a shell completion script
+    #[command(after_long_help = COMPLETIONS_HELP)]
     Completions {
         /// The shell
         #[arg(value_parser = one_of::<Shell>(), value_name = "SHELL")]
         shell: Shell,
     },
-    /// Print the manual page of glimt or of a command, as roff
-    #[command(after_help = MAN_HELP)]
+    /// Print the manual page of glimt or a command as roff
+    #[command(after_long_help = MAN_HELP)]
     Man {
         /// The command
         command: Option<String>,
     },
-    /// Print what a key of a scene means: type, unit, default, range
-    #[command(after_help = EXPLAIN_HELP)]
+    /// Describe a scene key: type, unit, range, default
+    #[command(after_long_help = EXPLAIN_HELP)]
     Explain {
-        /// The key, as in render.samples, materials.metal.roughness or samples; a table lists its keys
+        /// A key or table, such as render.samples, materials.metal.roughness, samples or sphere
         #[arg(add = candidates::keys())]
         key: Option<String>,
     },
-    /// Print the JSON Schema of a scene, by which editors complete keys and find mistakes
-    #[command(after_help = SCHEMA_HELP)]
+    /// Print the JSON Schema of scenes, for editors
+    #[command(after_long_help = SCHEMA_HELP)]
     Schema {
-        /// The draft of JSON Schema
+        /// Draft of JSON Schema
         #[arg(long, value_parser = one_of::<Draft>(), default_value = "4", value_name = "DRAFT")]
         draft: Draft,
     },
-    /// Serve an editor as a language server, over stdin and stdout
-    #[command(after_help = LSP_HELP)]
+    /// Run the language server on stdin and stdout
+    #[command(after_long_help = LSP_HELP)]
     Lsp {
-        /// Accepted and without effect: there is no other way to talk
+        /// Ignored: stdin and stdout are the only transport
         #[arg(long, hide = true)]
         stdio: bool,
     },
-    /// Report what glimt finds here: terminal, colours, protocols, processor, threads, cache
-    #[command(after_help = DOCTOR_HELP)]
+    /// Report what glimt detects: terminal, colors, processor, cache
+    #[command(after_long_help = DOCTOR_HELP)]
     Doctor,
 }
 
 const COMPLETIONS_HELP: &str = "\
-Load it when the shell starts:
+Load the script when the shell starts:
   bash        source <(glimt completions bash)                in ~/.bashrc
   zsh         source <(glimt completions zsh)                 in ~/.zshrc, after compinit
   fish        glimt completions fish | source                 in ~/.config/fish/config.fish
   elvish      eval (glimt completions elvish | slurp)         in ~/.config/elvish/rc.elv
   powershell  glimt completions powershell | Out-String | Invoke-Expression   in $PROFILE
 
-The script calls glimt for each completion: --set knows the tables and names of the scene in the line.";
+The script calls glimt for each completion, so --set completes the tables and names of the given scene.";
 
 const MAN_HELP: &str = "\
-  glimt man | man -l -                     read it
+  glimt man | man -l -                     show the page
   glimt man > ~/.local/share/man/man1/glimt.1
   glimt man check > ~/.local/share/man/man1/glimt-check.1";
 
@@ -212,21 +212,21 @@ const EXPLAIN_HELP: &str = "\
   glimt explain                               all tables
   glimt explain sphere                        the keys of a table
   glimt explain render.samples
-  glimt explain materials.metal.roughness     of one type; materials.roughness is that of all types
-  glimt explain roughness                     wherever it occurs
+  glimt explain materials.metal.roughness     of one type; materials.roughness covers all types
+  glimt explain roughness                     in all tables
 
-Exit codes: 0 explained; 2 there is no such key.";
+Exit codes: 0 success; 2 no such key.";
 
 const SCHEMA_HELP: &str = "\
-A scene that begins with the line
+In editors with Taplo (VS Code: Even Better TOML; also Helix, Neovim, Zed), a scene that starts with the line
   #:schema glimt.schema.json
-has the schema beside it in editors with Taplo (VS Code: Even Better TOML; also Helix, Neovim, Zed). `glimt new --schema` \
-writes both. Names of materials, files and geometry are left to `glimt check`.";
+uses the schema in its folder. `glimt new --schema` writes both. Names of materials, files and geometry are checked \
+only by `glimt check`.";
 
 choice! {
     /// Drafts of JSON Schema.
     pub enum Draft {
-        /// Draft 4, which Taplo reads.
+        /// Draft 4, which Taplo supports.
         Four = "4",
         /// Draft 2020-12.
         Latest = "2020-12",
@@ -234,7 +234,7 @@ choice! {
 }
 
 impl Draft {
-    /// The key that holds definitions.
+    /// The key for definitions.
     pub(super) fn definitions(self) -> &'static str {
         match self {
             Self::Four => "definitions",
@@ -242,7 +242,7 @@ impl Draft {
         }
     }
 
-    /// The name by which a schema says its draft.
+    /// The URI of the draft, for `$schema`.
     pub(super) fn uri(self) -> &'static str {
         match self {
             Self::Four => "http://json-schema.org/draft-04/schema#",
@@ -252,15 +252,14 @@ impl Draft {
 }
 
 const LSP_HELP: &str = "\
-Mistakes while you type, completion of keys, words and names, what a key means, definitions of names, colours. \
-The editor starts it for scenes; docs/editors.md has the lines for Neovim, Helix and others.";
+Provides errors while you type, completion of keys, values and names, descriptions of keys, definitions of names, and \
+colors. The editor starts the server; docs/editors.md has the configuration for Neovim, Helix and others.";
 
 const DOCTOR_HELP: &str = "\
-On a terminal it asks the terminal what it is and does, and waits a second at most for answers. The exit code is 0 \
-whatever it finds.";
+Queries the terminal's features and waits at most one second for answers. The exit code is always 0.";
 
 choice! {
-    /// Shells that complete.
+    /// Shells with completions.
     pub enum Shell {
         /// GNU bash, 4.4 or later.
         Bash = "bash",
@@ -276,221 +275,248 @@ choice! {
 }
 
 const IMPORT_HELP: &str = "\
-The scene is what `glimt FILE` shows, as a text to edit. Its meshes and images are in a folder beside it that has its \
-name. Where the file has something that glimt lacks, a comment names it and what stands for it, and so does a message. \
-Lights: 1 cd counts as 1 W/sr, 1 lx as 1 W/m2.
+The scene renders like `glimt FILE`. Its meshes and images are in a folder with the scene's name next to it. Features \
+that glimt lacks are approximated, with a warning and a comment in the scene. 1 cd is converted to 1 W/sr, 1 lx to \
+1 W/m2.
 
-Exit codes: 0 written; 1 it could not be written, or --strict and something has no equal; 2 the file is wrong, or \
-there is a file of that name.";
+Exit codes: 0 success; 1 the scene could not be written, or --strict and something is approximated; 2 the file is \
+invalid, or the scene exists already.";
 
-/// A file of another program, and the scene to write.
+/// Arguments of `import`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
     /// The file to read: gltf, glb
     #[arg(add = candidates::importable())]
     pub file: PathBuf,
-    /// The scene to write [FILE with .toml, in the working directory]
+    /// The scene to write [default: FILE with .toml, in the current folder]
     #[arg(short, long, value_name = "SCENE")]
     pub output: Option<PathBuf>,
-    /// Exit with 1, and write nothing, if something has no equal
+    /// Fail if anything cannot be converted exactly
     #[arg(long)]
     pub strict: bool,
-    /// Colours of the messages
-    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+    /// Colors: auto, truecolor, 256, 16, none
+    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorChoice,
 }
 
 const INFO_HELP: &str = "\
-All formats that glimt writes carry the settings; parts and checkpoints have the files that the picture was made of, too.
+Settings are stored in all formats that glimt writes. Parts and checkpoints also list the files that the image depends \
+on.
 
-Exit codes: 0 glimt made it; 1 the file does not say so; 2 it cannot be read, or is no picture.";
+Exit codes: 0 rendered by glimt; 1 no settings found; 2 the file cannot be read or is not an image.";
 
-/// A picture.
+/// Arguments of `info`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct InfoArgs {
-    /// The picture: png, apng, gif, exr, hdr, jpg, ppm; a part or a checkpoint
+    /// The image (png, apng, gif, exr, hdr, jpg, ppm), part or checkpoint
     pub image: PathBuf,
-    /// One JSON object on stdout in place of the lines
+    /// Print one JSON object on stdout
     #[arg(long)]
     pub json: bool,
-    /// Colours of the messages
-    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+    /// Colors: auto, truecolor, 256, 16, none
+    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW")]
     pub color: ColorChoice,
 }
 
 const COMPARE_HELP: &str = "\
-On linear values as they are: RMSE, max |a - b|, and relMSE = mean of (a - b)^2/(b^2 + 0.01), also \
-without the 0.1 % of the pixels that have the largest errors. On what a display shows, clamped sRGB: \
-PSNR; SSIM (Wang et al. 2004, on Rec. 709 luma); FLIP (Andersson et al. 2020, 67 pixels a degree).
+Computed from linear values: RMSE, max |a - b|, and relMSE = mean of (a - b)^2/(b^2 + 0.01), also \
+without the 0.1 % of the pixels with the largest errors. Computed from clamped sRGB: PSNR; SSIM (Wang et al. 2004, \
+on Rec. 709 luma); FLIP (Andersson et al. 2020, 67 pixels per degree).
 
-Bias is mean(a - b)/mean(b) of the luminance. EXR files of light that glimt rendered, whole, without photons and \
-with two samples a pixel or more, hold the standard error of their mean luminance: z is the bias over the standard \
-error that both give it. It asks for two seeds: with one, both pictures may have the same noise. The error is an \
-estimate by the samples: mostly 0.8 to 1.5 times the true one, up to 2 times at small details in few samples.
+Bias is mean(a - b)/mean(b) of the luminance. EXR files of complete beauty images without photons and with at least \
+two samples per pixel contain the standard error of their mean luminance: z is the bias divided by the combined \
+standard error. Use two different seeds, as images with the same seed may share their noise. The standard error is \
+estimated from the samples: usually 0.8 to 1.5 times the true value, up to 2 times for small details with few samples.
 
-On a terminal the pictures are above the table, the difference as FLIP; where FLIP is below 0.1 everywhere, as \
-|a - b| with its greatest value in white. --json shows none.
+On a terminal, both images and their difference are shown above the table. The difference is FLIP, or |a - b| scaled \
+to its maximum if FLIP is below 0.1 everywhere. --json shows no images.
 
-Files of 8 and 16 bits are taken for sRGB, float files for linear; alpha is left out.
+8- and 16-bit files are read as sRGB, floating-point files as linear. Alpha is ignored.
 
-Exit codes: 0 measured, and not above --max-relmse; 1 above it, or --diff could not be written; \
-2 the call or a file is wrong: sizes that differ, values that are not finite.";
+Exit codes: 0 success, with relMSE at most --max-relmse; 1 relMSE above it, or --diff could not be written; 2 invalid \
+arguments or files, such as different sizes or values that are not finite.";
 
-/// Two pictures and what is made of their difference.
+/// Arguments of `compare`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CompareArgs {
-    /// The picture that is judged: png, jpg, ppm, tga, bmp, webp, exr or hdr
+    /// The image to measure: png, jpg, ppm, tga, bmp, webp, exr or hdr
     pub a: PathBuf,
     /// The reference, of the same size
     pub b: PathBuf,
-    /// Exit with 1 if relMSE (of all pixels) is above X
+    /// Exit with 1 if relMSE is above X
     #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = error_bound)]
     pub max_relmse: Option<f64>,
-    /// Write the error as a picture, png, jpg, ppm: FLIP of each pixel, black for 0 through purple, red and orange to
-    /// pale yellow for 1; exr, hdr: |a - b|, linear
+    /// Write the error as an image
+    ///
+    /// png, jpg, ppm and webp show FLIP in false color, from black for 0 through purple, red and orange to pale yellow
+    /// for 1. exr and hdr contain |a - b|, linear.
     #[arg(long, value_name = "FILE")]
     pub diff: Option<PathBuf>,
-    /// One JSON object on stdout in place of the table; psnr_db is null where the pictures are equal, as is what is not known
+    /// Print one JSON object on stdout
+    ///
+    /// Unknown values are null, as is psnr_db for equal images.
     #[arg(long)]
     pub json: bool,
-    /// Show both pictures and their difference above the table
-    #[arg(long, value_parser = one_of::<Pictures>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Show the images and their difference: auto, on, off
+    #[arg(long, value_parser = one_of::<Pictures>(), hide_possible_values = true, long_help = listed::<Pictures>("Show the images and their difference above the table"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub pictures: Pictures,
-    /// Colours of the pictures and of messages; auto looks at the terminal and at NO_COLOR
-    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Colors: auto, truecolor, 256, 16, none
+    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
 }
 
-/// A render's options; each overrides the scene for this run.
+/// Arguments of a render. Options override the scene's settings for this run.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
-    /// The scene file (TOML), or a model: obj, off, ply, stl, glb, gltf
+    /// A scene (TOML) or a model: obj, off, ply, stl, glb, gltf
     #[arg(required = true, add = candidates::scenes_and_models(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Render once without the terminal UI, write the picture, exit
+    /// Render once, write the image and exit
     #[arg(long)]
     pub once: bool,
 
-    /// Another value for a key of the scene, as in render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3
-    /// (the second one) or sphere.ball.radius=.3 (by name); may be given several times. Options come after it
+    /// Override a scene key
+    ///
+    /// For example render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3 (the second sphere) or
+    /// sphere.ball.radius=.3 (the sphere named ball). Can be given several times. Dedicated options have precedence.
     #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
-    /// Write the picture to this file.
-    #[arg(short, long = "output", value_name = "FILE", help = outputs_help(), help_heading = "Output")]
+    /// Output file; can be given several times
+    #[arg(short, long = "output", value_name = "FILE", long_help = outputs_help(), help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
-    /// Numbers about each pixel as channels beside the picture in EXR files, with --once: all, or some of albedo, normal,
-    /// depth, variance, samples, ambient, diffuse, specular, emission, with commas between them
+    /// Extra channels (AOVs) in EXR files, with --once
+    ///
+    /// Either all, or a comma-separated list of albedo, normal, depth, variance, samples, ambient, diffuse, specular and
+    /// emission.
     #[arg(long, value_name = "all|LIST", value_parser = layers, help_heading = "Output")]
     pub layers: Option<Layers>,
     /// Bits per channel of PNG files: 8 or 16
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = bit_depth, help_heading = "Output")]
     pub bit_depth: Option<u8>,
-    /// Write settings, timings and counters of the render as JSON; with --once, - is stdout
+    /// Write settings, timings and counters as JSON
+    ///
+    /// With --once, - is stdout.
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     pub report: Option<PathBuf>,
-    /// Let the report and the default picture replace a file that glimt did not write, too
+    /// Replace files not written by glimt
+    ///
+    /// Without this option, the report and the default image only replace files that glimt wrote.
     #[arg(long, help_heading = "Output")]
     pub force: bool,
 
-    /// Render part I of N with --once; -o names its file, and `glimt merge` joins the parts
+    /// Render part I of N, with --once
+    ///
+    /// -o is the file of the part. `glimt merge` merges the parts.
     #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = shard, help_heading = "Long renders")]
     pub shard: Option<(u32, u32)>,
-    /// Seconds between two checkpoints, beside the output as FILE.checkpoint; 0 keeps none
-    #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = pause, help_heading = "Long renders")]
+    /// Interval between checkpoints; 0 disables them
+    ///
+    /// Checkpoints are saved next to the output as FILE.checkpoint.
+    #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = checkpoint_interval, help_heading = "Long renders")]
     pub checkpoint: f64,
-    /// Go on from the checkpoint of an interrupted render; without --once glimt does that by itself
+    /// Resume from a checkpoint (automatic without --once)
     #[arg(long, help_heading = "Long renders")]
     pub resume: bool,
-    /// Keep the last checkpoint of a finished render, which --resume with more --samples extends
+    /// Keep the checkpoint of a finished render
+    ///
+    /// --resume with more --samples continues from it.
     #[arg(long, help_heading = "Long renders")]
     pub keep_checkpoint: bool,
-    /// Refuse a render that would need more memory than this, as in 8GiB or 500MB
+    /// Refuse to use more memory, such as 8GiB or 500MB
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = memory, help_heading = "Long renders")]
     pub memory: Option<u64>,
 
-    /// Pixels across
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Picture")]
+    /// Width in pixels
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Image")]
     pub width: Option<u32>,
-    /// Pixels down
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Picture")]
+    /// Height in pixels
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Image")]
     pub height: Option<u32>,
-    /// Samples per pixel, at most
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Picture")]
+    /// Most samples per pixel
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Image")]
     pub samples: Option<u32>,
-    /// Stop sampling each tile once its noise is below this part of its brightness; 0: never
-    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_of("error", ERROR), help_heading = "Picture")]
+    /// Relative noise at which a tile is finished; 0 disables it
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_of("error", ERROR), help_heading = "Image")]
     pub error: Option<f32>,
-    /// Stop after this long; until then, samples go where they lower the error most
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Picture")]
+    /// Stop after this time
+    ///
+    /// Until then, pixels are sampled where that lowers the error most.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, help_heading = "Image")]
     pub time: Option<f64>,
-    /// Render these pixels only (left, top, width, height); the rest stays black
-    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
+    /// Render only this rectangle: left, top, width, height
+    #[arg(long, value_name = "X,Y,W,H", allow_hyphen_values = true, value_parser = crop, help_heading = "Image")]
     pub crop: Option<Rect>,
-    /// The view to render: the beauty picture or an AOV
-    #[arg(long, value_parser = one_of::<View>(), value_name = "NAME", help_heading = "Picture")]
+    /// Render a view (AOV), such as normal or albedo
+    #[arg(long, value_parser = one_of::<View>(), hide_possible_values = true, long_help = listed::<View>("Render a view: the beauty image or an AOV"), value_name = "NAME", help_heading = "Image")]
     pub view: Option<View>,
-    /// The side from which a model is seen, in place of its own camera
-    #[arg(long, value_parser = one_of::<Side>(), value_name = "SIDE", help_heading = "Picture")]
+    /// View a model from front, back, left, right, top, bottom or iso
+    #[arg(long, value_parser = one_of::<Side>(), hide_possible_values = true, long_help = listed::<Side>("View a model from this side instead of its own camera"), value_name = "SIDE", help_heading = "Image")]
     pub from: Option<Side>,
-    /// The axis of a model that points upwards [default: z of stl, and of ply by Blender, else y]
-    #[arg(long, value_parser = one_of::<UpAxis>(), value_name = "AXIS", help_heading = "Picture")]
+    /// Up axis of a model: x, y, z
+    #[arg(long, value_parser = one_of::<UpAxis>(), hide_possible_values = true, long_help = listed::<UpAxis>("Up axis of a model. The default is z for STL and for PLY files from Blender, otherwise y"), value_name = "AXIS", help_heading = "Image")]
     pub up: Option<UpAxis>,
-    /// Render N pictures all around the point that the camera looks at, with --once; -o names a file each, as in
-    /// name_####.png, or a moving picture: .gif, .apng. --samples, --error and --time count for each picture
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Picture")]
+    /// Render N frames around look_at, with --once
+    ///
+    /// -o is a file per frame, such as name_####.png, or an animation, .gif or .apng. --samples, --error and --time apply
+    /// to each frame.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Image")]
     pub turntable: Option<u32>,
-    /// Seed of all random numbers
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Picture")]
+    /// Random seed
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Image")]
     pub seed: Option<u32>,
 
-    /// Rendering algorithm
-    #[arg(long, value_parser = one_of::<Integrator>(), value_name = "NAME", help_heading = "Method")]
+    /// Integrator: whitted, path
+    #[arg(long, value_parser = one_of::<Integrator>(), hide_possible_values = true, long_help = listed::<Integrator>("Integrator"), value_name = "NAME", help_heading = "Rendering")]
     pub integrator: Option<Integrator>,
-    /// Scatterings along one path; 0: emitted light only, 1: direct light
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "Method")]
+    /// Most bounces per path; 1 is direct light only
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "Rendering")]
     pub max_depth: Option<u32>,
-    /// Shadows; hard: one ray to the middle of an area light
-    #[arg(long, value_parser = one_of::<Shadows>(), value_name = "HOW", help_heading = "Method")]
+    /// Shadows: off, hard, soft
+    #[arg(long, value_parser = one_of::<Shadows>(), hide_possible_values = true, long_help = listed::<Shadows>("Shadows, in whitted"), value_name = "HOW", help_heading = "Rendering")]
     pub shadows: Option<Shadows>,
-    /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection: less noise, but too dark; 0: none
-    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_of("clamp", CLAMP), help_heading = "Method")]
+    /// Limit indirect radiance per bounce (removes fireflies, biased)
+    ///
+    /// Applies after the first diffuse or glossy reflection of a path. 0 disables the limit.
+    #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_of("clamp", CLAMP), help_heading = "Rendering")]
     pub clamp: Option<f32>,
-    /// Indirect light and caustics from photon maps, in whitted
-    #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
+    /// Photon mapping in whitted: indirect light and caustics
+    #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
     pub photons: Option<Switch>,
-    /// Depth of field, where the camera has an aperture
-    #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "Method")]
+    /// Depth of field, if the camera has an aperture
+    #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
     pub dof: Option<Switch>,
-    /// Acceleration structure
-    #[arg(long, value_parser = one_of::<Accel>(), value_name = "NAME", help_heading = "Method")]
+    /// Acceleration structure: bvh, bvh-high, kdtree
+    #[arg(long, value_parser = one_of::<Accel>(), hide_possible_values = true, long_help = listed::<Accel>("Acceleration structure"), value_name = "NAME", help_heading = "Rendering")]
     pub accel: Option<Accel>,
-    /// Threads that render; 0: one per core
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Method")]
+    /// Rendering threads; 0 is one per core
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "Rendering")]
     pub threads: Option<usize>,
-    /// Give way to other programs, from 0, not at all, to 19 [default: 0 with --once, else 10]
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, help_heading = "Method")]
+    /// Scheduling niceness, 0–19 [default: 0 with --once, else 10]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, help_heading = "Rendering")]
     pub nice: Option<u8>,
 
-    /// Progress on stderr with --once
-    #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Progress with --once: auto, plain, json, none
+    #[arg(long, value_parser = one_of::<Progress>(), hide_possible_values = true, long_help = listed::<Progress>("Progress on stderr with --once"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
-    /// Kind of preview
-    #[arg(long, value_parser = one_of::<PreviewChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Preview: auto, halfblock, sextant, kitty, …
+    #[arg(long, value_parser = one_of::<PreviewChoice>(), hide_possible_values = true, long_help = listed::<PreviewChoice>("How the preview is drawn"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub preview: PreviewChoice,
-    /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
-    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Colors: auto, truecolor, 256, 16, none
+    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
-    /// Notify through the terminal when a render of more seconds than this ends while its window has no focus; 0 turns this off
-    #[arg(long, allow_negative_numbers = true, value_parser = notice, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
+    /// Notify after longer renders; 0 disables it
+    ///
+    /// Shows a desktop notification through the terminal when a longer render ends while the window is not focused.
+    #[arg(long, allow_negative_numbers = true, value_parser = notification_time, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
     pub notify_after: f64,
-    /// Look at the files several times a second rather than rely on the system's notifications
+    /// Poll files instead of using system notifications
     #[arg(long, help_heading = "Terminal")]
     pub poll: bool,
 }
 
 impl RenderArgs {
-    /// Overrides of a scene by these options.
+    /// The overrides given by these options.
     pub(super) fn overrides(&self) -> Overrides {
         let mut overrides = Overrides {
             sets: self.sets.clone(),
@@ -515,7 +541,7 @@ impl RenderArgs {
                 resume: match (self.resume, self.once) {
                     (true, true) => Resume::Asked,
                     (false, true) => Resume::No,
-                    // A dropped line is no reason to begin anew; an edit makes another picture, which has no checkpoint yet.
+                    // Continue after a dropped connection. After an edit there is no checkpoint of the new image.
                     (_, false) => Resume::IfSame,
                 },
                 are_kept: self.keep_checkpoint,
@@ -535,25 +561,25 @@ impl RenderArgs {
 }
 
 choice! {
-    /// Ways to say progress.
+    /// Progress reports.
     pub enum Progress {
         /// Bars on a terminal, plain lines elsewhere.
         Auto = "auto",
-        /// Lines now and then.
+        /// Occasional lines.
         Plain = "plain",
-        /// One JSON object a line: its key "event" is stage, asset, progress, written, done, failed or cancelled.
+        /// One JSON object per line. Its key "event" is stage, asset, progress, written, done, failed or cancelled.
         Json = "json",
-        /// Nothing but errors and warnings.
+        /// Only errors and warnings.
         None = "none",
     }
 }
 
 choice! {
-    /// Whether pictures are shown with the answer.
+    /// Whether `compare` shows images.
     pub enum Pictures {
-        /// On a terminal of 30 columns or more.
+        /// On a terminal with at least 30 columns.
         Auto = "auto",
-        /// Always; for 80 columns if there is no terminal.
+        /// Always; 80 columns wide without a terminal.
         On = "on",
         /// Never.
         Off = "off",
@@ -563,9 +589,9 @@ choice! {
 choice! {
     /// On or off.
     pub enum Switch {
-        /// Yes.
+        /// On.
         On = "on",
-        /// No.
+        /// Off.
         Off = "off",
     }
 }
@@ -576,7 +602,7 @@ impl From<Switch> for bool {
     }
 }
 
-/// Reads a choice by its name; help lists the names with what they mean.
+/// Parses a choice by its name.
 fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
     let known = C::ALL.iter().map(|one| PossibleValue::new(one.name()).help(one.meaning()));
     let other = C::UNAVAILABLE.iter().map(|&name| PossibleValue::new(name).help(UNAVAILABLE));
@@ -588,14 +614,21 @@ fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
 
 const UNAVAILABLE: &str = "not available in this version";
 
-/// Help of `--output`, with the endings of all formats that glimt writes.
+/// Long help of an option with the values of a choice, in the format of clap.
+fn listed<C: Choice>(about: &str) -> String {
+    let values: String = C::ALL.iter().map(|one| format!("\n- {}: {}", one.name(), one.meaning())).collect();
+    format!("{about}\n\nPossible values:{values}")
+}
+
+/// Long help of `--output`, with the extensions of all formats that glimt writes.
 fn outputs_help() -> String {
-    // The other spelling of jpg says nothing new.
+    // Skip jpeg, the same format as jpg.
     let still: Vec<_> = Format::endings().filter(|ending| *ending != "jpeg").collect();
     let moving: Vec<_> = MovingFormat::endings().collect();
     format!(
-        "Write the picture to this file; may be given several times. The ending chooses the format: {}; with --turntable also \
-         {}. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]",
+        "Output file; can be given several times\n\n\
+         The extension chooses the format: {}; with --turntable also {}. The default is the scene's `output`, relative to \
+         the scene, or else the scene's name with .png, in the current folder.",
         still.join(", "),
         moving.join(", ")
     )
@@ -613,17 +646,17 @@ fn any_whole(text: &str) -> Result<u32, String> {
     whole(text, 0..=u32::MAX)
 }
 
-/// Reads the value of an option that overrides a whole number of `[render]`.
+/// Parses an option that overrides an integer of `[render]`.
 fn whole_of(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
     move |text| match Render::key(key).map(|key| key.range) {
         Some(KeyRange::Whole(range)) => whole(text, range),
         Some(KeyRange::Number(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
-            Err(format!("`{key}` is no whole number of [render]"))
+            Err(format!("`{key}` is not an integer key of [render]"))
         }
     }
 }
 
-/// Reads the value of an option that overrides a number of `[render]`; `expected` is the message for a wrong one.
+/// Parses an option that overrides a number of `[render]`. `expected` is the error message.
 fn number_of(
     key: &'static str,
     expected: &'static str,
@@ -632,7 +665,7 @@ fn number_of(
         let range = match Render::key(key).map(|key| key.range) {
             Some(KeyRange::Number(range)) => range,
             Some(KeyRange::Whole(_) | KeyRange::Names(_) | KeyRange::Color) | None => {
-                return Err(format!("`{key}` is no number of [render]"));
+                return Err(format!("`{key}` is not a number key of [render]"));
             }
         };
         let number = text.parse::<f32>().ok().filter(|number| range.contains(&f64::from(*number)));
@@ -640,10 +673,10 @@ fn number_of(
     }
 }
 
-/// The message for a wrong `--error`.
-const ERROR: &str = "expected a part of the brightness, such as 0.02; 0 for none";
-/// The message for a wrong `--clamp`.
-const CLAMP: &str = "expected a radiance from 0 to 1e18; 0 for none";
+/// Error message for `--error`.
+const ERROR: &str = "expected a relative error, such as 0.02, or 0 to disable it";
+/// Error message for `--clamp`.
+const CLAMP: &str = "expected a radiance from 0 to 1e18, where 0 is no limit";
 
 fn whole(text: &str, range: RangeInclusive<u32>) -> Result<u32, String> {
     let number = text.parse().ok().filter(|number| range.contains(number));
@@ -657,25 +690,25 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Reads seconds, or 0 for never.
-fn pause(text: &str) -> Result<f64, String> {
+/// Parses the checkpoint interval.
+fn checkpoint_interval(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds, or 0 for no checkpoints".to_owned()),
     }
 }
 
-/// Reads seconds, or 0 for never.
-fn notice(text: &str) -> Result<f64, String> {
+/// Parses the time for notifications.
+fn notification_time(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds, or 0 for no notifications".to_owned()),
     }
 }
 
-/// Reads a size in bytes, with a unit or without.
+/// Parses a size in bytes, with an optional unit.
 fn memory(text: &str) -> Result<u64, String> {
-    let expected = || "expected a size, as in 8GiB, 500MB or 1000000".to_owned();
+    let expected = || "expected a size, such as 8GiB, 500MB or 1000000".to_owned();
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let number: f64 = digits.trim().parse().map_err(|_| expected())?;
     let unit: u64 = match text[digits.len()..].to_lowercase().as_str() {
@@ -694,26 +727,29 @@ fn memory(text: &str) -> Result<u64, String> {
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
 }
 
-/// Reads a part of a picture: its number and the number of parts.
+/// Parses the number of a part and the number of parts.
 fn shard(text: &str) -> Result<(u32, u32), String> {
     let numbers =
         text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
     match numbers {
-        Some((index, count)) if (1..=count).contains(&index) && count <= parts::MOST => Ok((index, count)),
-        _ => {
-            Err(format!("expected I/N, the part and the number of parts, as in 1/8; at most {}", parts::MOST))
+        Some((index, count)) if (1..=count).contains(&index) && count <= parts::MAX_PARTS => {
+            Ok((index, count))
         }
+        _ => Err(format!(
+            "expected I/N, such as 1/8 for the first of 8 parts, with N at most {}",
+            parts::MAX_PARTS
+        )),
     }
 }
 
 fn error_bound(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
-        _ => Err("expected a number that is not below 0".to_owned()),
+        _ => Err("expected a nonnegative number".to_owned()),
     }
 }
 
-/// Layers of EXR files, each once.
+/// Layers of EXR files, without duplicates.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers(pub Vec<Layer>);
 
@@ -725,7 +761,7 @@ fn layers(text: &str) -> Result<Layers, String> {
     for name in text.split(',').map(str::trim) {
         let layer = Layer::named(name).ok_or_else(|| {
             let known: Vec<_> = Layer::ALL.iter().map(|layer| layer.name()).collect();
-            format!("there is no layer {name:?}; there are all, {}", known.join(", "))
+            format!("unknown layer {name:?}; expected all, {}", known.join(", "))
         })?;
         if !layers.contains(&layer) {
             layers.push(layer);
@@ -739,10 +775,10 @@ fn turntable(text: &str) -> Result<u32, String> {
 }
 
 fn threads(text: &str) -> Result<usize, String> {
-    const MOST: usize = 4096;
+    const MAX_THREADS: usize = 4096;
     match text.parse::<usize>() {
-        Ok(count) if count <= MOST => Ok(count),
-        _ => Err(format!("expected a number from 0 to {MOST}")),
+        Ok(count) if count <= MAX_THREADS => Ok(count),
+        _ => Err(format!("expected a number from 0 to {MAX_THREADS}")),
     }
 }
 
@@ -754,6 +790,6 @@ fn crop(text: &str) -> Result<Rect, String> {
     let numbers: Vec<u32> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
     match (numbers.as_slice(), text.split(',').count()) {
         (&[x, y, width, height], 4) if width > 0 && height > 0 => Ok(Rect { x, y, width, height }),
-        _ => Err("expected four whole numbers X,Y,W,H with W and H above 0, as in 100,50,64,64".to_owned()),
+        _ => Err("expected X,Y,W,H with W and H above 0, such as 100,50,64,64".to_owned()),
     }
 }

@@ -3,118 +3,122 @@
 use std::path::PathBuf;
 
 use super::{
-    CLAMP, Progress, Switch, any_whole, candidates, nice, number_of, one_of, seconds, threads, whole,
+    CLAMP, Progress, Switch, any_whole, candidates, listed, nice, number_of, one_of, seconds, threads, whole,
     whole_of,
 };
 use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
 pub(super) const HELP: &str = "\
-Every picture is measured against two references of independent noise, by mean of (x - r1)(x - r2)/(r² + 0.01): \
-their noise is not read as error. What pictures of different seeds have in common is the method's bias; a slope \
-that flattens is called so, with the size. References are kept in $XDG_CACHE_HOME/glimt/references, else \
-~/.cache/glimt/references, as long as the scene, its files and the size are the same.
+Each image is compared with two references with independent noise, by the mean of (x - r1)(x - r2)/(r² + 0.01), so their \
+noise does not count as error. The error that images with different seeds have in common is the bias of the method. \
+References are cached in $XDG_CACHE_HOME/glimt/references or ~/.cache/glimt/references, and reused while the scene, its \
+files and the size are unchanged.
 
-Without --samples or --time, each method goes on to 4 times the samples as long as there is time (--within). \
-Without options of methods: path, whitted with photons, and the scene as it is where that is neither. Lists are \
-multiplied: --integrator path,whitted --photons on,off. Without SCENE, the one that glimt new writes.
+Without --samples or --time, each method quadruples its samples while time remains (--within). The default methods are \
+path, whitted with photons, and the scene's own settings if they differ. All combinations of lists are measured, as with \
+--integrator path,whitted --photons on,off. The default scene is the one that `glimt new` writes.
 
-Exit codes: 0 measured; 1 the work failed; 2 the call or a scene is wrong; 130, 143, 129 ended by a signal.";
+Exit codes: 0 success; 1 failure; 2 invalid arguments or scene; 130, 143 or 129 terminated by a signal.";
 
-/// Scenes, methods and outputs of a benchmark.
+/// Arguments of `bench`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BenchArgs {
     /// The scene files
     #[arg(value_name = "SCENE", add = candidates::scenes())]
     pub scenes: Vec<PathBuf>,
 
-    /// Write every picture's seconds and error, a line each
+    /// Write the time and error of every image as CSV
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub csv: Option<PathBuf>,
-    /// Write everything that was measured, also for a later --baseline
+    /// Write all results as JSON, also for --baseline
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
-    /// Draw the error against the seconds on log axes
+    /// Plot error against time as SVG
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     pub plot: Option<PathBuf>,
-    /// Replace files that glimt did not write, too
+    /// Replace files not written by glimt
     #[arg(long, help_heading = "Output")]
     pub force: bool,
-    /// Say what became slower or worse since the run that wrote this file by --json, and whether it is noise
+    /// Report regressions since the run with this --json file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub baseline: Option<PathBuf>,
 
-    /// Samples per pixel to measure at, such as 1,4,16,64
+    /// Samples per pixel to measure at, such as 1,4,16
     #[arg(long, value_name = "N,N", value_delimiter = ',', allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub samples: Vec<u32>,
-    /// Seconds of rendering to measure at, in place of samples, such as 0.1,0.5,2
+    /// Render times to measure at instead, such as 0.1,0.5,2
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_negative_numbers = true, value_parser = seconds, conflicts_with = "samples", help_heading = "Measurement")]
     pub time: Vec<f64>,
-    /// Pictures at each point, each of a seed of its own
+    /// Images per point, each with a different seed
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seeds, default_value = "6", help_heading = "Measurement")]
     pub seeds: u32,
-    /// The first of the seeds
+    /// The first seed
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = any_whole, default_value = "1", help_heading = "Measurement")]
     pub seed: u32,
-    /// Pixels across [default: with the scene's aspect, 96 on the longer side]
+    /// Width in pixels [default: 96 on the longer side]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Measurement")]
     pub width: Option<u32>,
-    /// Pixels down
+    /// Height in pixels
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Measurement")]
     pub height: Option<u32>,
-    /// Seconds that all of it may take, as far as samples are left open
+    /// Time limit where --samples and --time leave it open
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds, default_value = "240", help_heading = "Measurement")]
     pub within: f64,
-    /// A float picture as the reference; given twice, two of independent noise
+    /// Floating-point image to use as reference
+    ///
+    /// Can be given twice, for two references with independent noise.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["reference_samples", "width", "height"], help_heading = "Measurement")]
     pub reference: Vec<PathBuf>,
-    /// Samples per pixel of each reference [default: by the time, or 100 times the most --samples]
+    /// Samples per pixel of each reference
+    ///
+    /// The default uses the available time, but at most 100 times the largest --samples.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub reference_samples: Option<u32>,
-    /// Folder for references
+    /// Folder for cached references
     #[arg(long, value_name = "FOLDER", help_heading = "Measurement")]
     pub cache: Option<PathBuf>,
-    /// Make references anew and keep none
+    /// Render new references without caching them
     #[arg(long, conflicts_with = "cache", help_heading = "Measurement")]
     pub no_cache: bool,
 
-    /// Rendering algorithms
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Integrator>(), value_name = "LIST", help_heading = "Methods, each a list")]
+    /// Integrators: whitted, path
+    #[arg(long, value_delimiter = ',', value_parser = one_of::<Integrator>(), hide_possible_values = true, long_help = listed::<Integrator>("Integrators"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub integrator: Vec<Integrator>,
-    /// Indirect light and caustics from photon maps, in whitted
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Switch>(), value_name = "LIST", help_heading = "Methods, each a list")]
+    /// Photon mapping in whitted: on, off
+    #[arg(long, value_delimiter = ',', value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub photons: Vec<Switch>,
-    /// Shadows, in whitted
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Shadows>(), value_name = "LIST", help_heading = "Methods, each a list")]
+    /// Shadows in whitted: off, hard, soft
+    #[arg(long, value_delimiter = ',', value_parser = one_of::<Shadows>(), hide_possible_values = true, long_help = listed::<Shadows>("Shadows, in whitted"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub shadows: Vec<Shadows>,
-    /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection; 0: none
-    #[arg(long, value_delimiter = ',', value_parser = number_of("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods, each a list")]
+    /// Limits on indirect radiance per bounce; 0 is no limit
+    #[arg(long, value_delimiter = ',', value_parser = number_of("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods (comma-separated lists)")]
     pub clamp: Vec<f32>,
-    /// Acceleration structure
-    #[arg(long, value_delimiter = ',', value_parser = one_of::<Accel>(), value_name = "LIST", help_heading = "Methods, each a list")]
+    /// Acceleration structures: bvh, bvh-high, kdtree
+    #[arg(long, value_delimiter = ',', value_parser = one_of::<Accel>(), hide_possible_values = true, long_help = listed::<Accel>("Acceleration structures"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub accel: Vec<Accel>,
 
-    /// Another value for a key of the scenes, as in a render
-    #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE", help_heading = "All pictures and references")]
+    /// Override a scene key
+    #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
-    /// Scatterings along one path
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All pictures and references")]
+    /// Most bounces per path
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All images and references")]
     pub max_depth: Option<u32>,
-    /// Depth of field, where the camera has an aperture
-    #[arg(long, value_parser = one_of::<Switch>(), value_name = "on|off", help_heading = "All pictures and references")]
+    /// Depth of field, if the camera has an aperture
+    #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "All images and references")]
     pub dof: Option<Switch>,
-    /// Threads that render; 0: one per core
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "All pictures and references")]
+    /// Rendering threads; 0 is one per core
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = threads, help_heading = "All images and references")]
     pub threads: Option<usize>,
-    /// Give way to other programs, from 0, not at all, to 19
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, default_value = "0", help_heading = "All pictures and references")]
+    /// Scheduling niceness, 0–19
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = nice, default_value = "0", help_heading = "All images and references")]
     pub nice: u8,
 
-    /// Progress on stderr
-    #[arg(long, value_parser = one_of::<Progress>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Progress on stderr: auto, plain, json, none
+    #[arg(long, value_parser = one_of::<Progress>(), hide_possible_values = true, long_help = listed::<Progress>("Progress on stderr"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub progress: Progress,
-    /// Colours of messages and of the plot in the terminal; auto looks at the terminal and at NO_COLOR
-    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
+    /// Colors: auto, truecolor, 256, 16, none
+    #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
 }
 

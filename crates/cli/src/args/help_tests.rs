@@ -4,7 +4,7 @@ use clap::CommandFactory;
 
 use super::Args;
 
-/// The short and the long help of the program and of each command, in this many columns.
+/// The short help of the program and both helps of each command, at this width.
 fn helps(columns: usize) -> Vec<(String, String)> {
     let mut all = Args::command().term_width(columns);
     all.build();
@@ -21,7 +21,7 @@ fn helps(columns: usize) -> Vec<(String, String)> {
 fn help_fits_its_columns() {
     for columns in [80, 100, 140] {
         for (name, help) in helps(columns) {
-            // The usage is one line, whatever its length.
+            // The usage line is not wrapped.
             for line in help.lines().filter(|line| !line.starts_with("Usage:")) {
                 assert!(line.chars().count() <= columns, "{name} at {columns}: {line}");
             }
@@ -29,7 +29,7 @@ fn help_fits_its_columns() {
     }
 }
 
-/// A line of running text ends only where the next word does not fit: it is not broken twice.
+/// A line of text ends only where the next word does not fit.
 #[test]
 fn help_is_wrapped_once() {
     for columns in [80, 100, 140] {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Parser;
 
-use crate::args::{Args, Engine, FarmArgs, RenderArgs, Switch};
+use crate::args::{Args, FarmArgs, RenderArgs, Scheduler, Switch};
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::Format;
@@ -32,9 +32,9 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
         Err(message) => return console.fail(Exit::WRONG, &format!("behind `--`: {message}")),
     };
     console.text(&match args.engine {
-        Engine::Slurm => slurm(args),
-        Engine::Parallel => parallel(args),
-        Engine::Kubernetes => kubernetes(args, memory(args, &options, console)),
+        Scheduler::Slurm => slurm(args),
+        Scheduler::Parallel => parallel(args),
+        Scheduler::Kubernetes => kubernetes(args, memory(args, &options, console)),
     });
     Exit::DONE
 }

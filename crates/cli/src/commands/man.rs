@@ -1,4 +1,4 @@
-//! `glimt man`: the manual page of the program or of a command, as roff.
+//! `glimt man`: manual pages as roff.
 
 use clap::CommandFactory;
 use clap_mangen::Man;
@@ -10,7 +10,7 @@ use crate::environment::VARIABLES;
 use crate::exit::Exit;
 use crate::scene::nearest::nearest;
 
-/// Prints the page of a command, or of the program.
+/// Prints the manual page of a command, or of the program.
 pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
     let mut all = Args::command();
     all.build();
@@ -23,29 +23,29 @@ pub(crate) fn run(command: Option<&str>, console: &Console) -> Exit {
         let names: Vec<&str> = all.get_subcommands().map(clap::Command::get_name).collect();
         let help = match nearest(name, names.iter().copied()) {
             Some(near) => format!("did you mean `{near}`?"),
-            None => format!("there are {}", names.join(", ")),
+            None => format!("expected one of {}", names.join(", ")),
         };
-        return console.fail(Exit::WRONG, &format!("there is no command {name:?}: {help}"));
+        return console.fail(Exit::WRONG, &format!("unknown command {name:?}: {help}"));
     };
     match page(found, command.is_none()) {
         Ok(text) => {
             console.text(&text);
             Exit::DONE
         }
-        Err(error) => console.fail(Exit::FAILED, &format!("cannot make the page: {error}")),
+        Err(error) => console.fail(Exit::FAILED, &format!("cannot create the manual page: {error}")),
     }
 }
 
-/// The page; that of the program has the sections that hold for all commands.
+/// Renders a page. The program's page also has the sections common to all commands.
 fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
     let name = command.get_display_name().unwrap_or("glimt").to_owned();
-    let notes = command.get_after_help().map(ToString::to_string);
+    let notes = command.get_after_long_help().map(ToString::to_string);
     let usage = command.clone().render_usage().to_string();
     let man = Man::new(command.clone().display_name(name).version(env!("CARGO_PKG_VERSION")));
     let mut bytes = Vec::new();
     man.render_title(&mut bytes)?;
     man.render_name_section(&mut bytes)?;
-    // Every option in a row would be half a page.
+    // clap_mangen's synopsis lists every option, which takes half a page.
     section("SYNOPSIS", usage.trim_start_matches("Usage:").trim()).to_writer(&mut bytes)?;
     man.render_description_section(&mut bytes)?;
     man.render_options_section(&mut bytes)?;
@@ -60,7 +60,7 @@ fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// A section whose lines stay as they are.
+/// A section with preformatted lines.
 fn section(heading: &str, lines: &str) -> Roff {
     let mut roff = Roff::default();
     roff.control("SH", [heading]);
