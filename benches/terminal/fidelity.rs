@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use glimt::film::Picture;
 use glimt::math::Vec3;
 use glimt::math::color::srgb8_to_linear;
-use glimt::tui::{ColorDepth, PreviewChoice, filled, in_xterm, shown};
+use glimt::tui::{ColorDepth, PreviewChoice, filled_squares, xterm_rgb, shown};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -196,10 +196,10 @@ impl LinearImage {
             let cell = &buffer[(area.x + (x / CELL.0) as u16, area.y + (y / CELL.1) as u16)];
             let place = y % CELL.1 / (CELL.1 / 12) * 2 + x % CELL.0 / (CELL.0 / 2);
             let symbol = cell.symbol().chars().next().unwrap_or(' ');
-            let [ink, ground] = [in_xterm(cell.fg).unwrap_or(INK), in_xterm(cell.bg).unwrap_or(GROUND)];
+            let [ink, ground] = [xterm_rgb(cell.fg).unwrap_or(INK), xterm_rgb(cell.bg).unwrap_or(GROUND)];
             let [ink, ground] = [ink, ground].map(srgb8_to_linear);
-            let part = match (filled(symbol), (symbol as usize).checked_sub(0x20)) {
-                (Some(filled), _) => f32::from(u8::from(filled[place])),
+            let part = match (filled_squares(symbol), (symbol as usize).checked_sub(0x20)) {
+                (Some(filled_squares), _) => f32::from(u8::from(filled_squares[place])),
                 (None, Some(number)) => INK_OF_ASCII.get(number).map_or(0.0, |ink| f32::from(*ink) / 255.0),
                 (None, None) => 0.0,
             };

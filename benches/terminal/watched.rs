@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use glimt::tui::{PixelScreen, filled, in_xterm};
+use glimt::tui::{PixelScreen, filled_squares, xterm_rgb};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use ratatui::style::Color;
 
@@ -80,12 +80,12 @@ impl FarEnd {
 fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
     let color = |color| match color {
         vt100::Color::Default => None,
-        vt100::Color::Idx(index) => in_xterm(Color::Indexed(index)),
+        vt100::Color::Idx(index) => xterm_rgb(Color::Indexed(index)),
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
     };
     let (fg, bg) = (color(cell.fgcolor()), color(cell.bgcolor()));
-    let filled = filled(cell.contents().chars().next().unwrap_or(' ')).unwrap_or([false; 24]);
-    filled.map(|is_ink| if is_ink { fg } else { bg }.unwrap_or_default())
+    let filled_squares = filled_squares(cell.contents().chars().next().unwrap_or(' ')).unwrap_or([false; 24]);
+    filled_squares.map(|is_ink| if is_ink { fg } else { bg }.unwrap_or_default())
 }
 
 /// A terminal that runs the program.

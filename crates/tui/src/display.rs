@@ -167,7 +167,7 @@ impl Display {
     }
 
     /// Sets the window title, which is sent after the preview.
-    pub(super) fn dress(&mut self, title: WindowTitle) {
+    pub(super) fn set_title(&mut self, title: WindowTitle) {
         self.window_titles[0] = title;
     }
 
@@ -186,7 +186,7 @@ impl Display {
         let [wanted, sent] = &self.window_titles;
         let mut bytes = Vec::new();
         if wanted.title != sent.title {
-            bytes.extend_from_slice(terminal::before_title());
+            bytes.extend_from_slice(terminal::title_saving_bytes());
         }
         if wanted.bar.is_some() {
             terminal::will_have_progress();
@@ -320,10 +320,10 @@ impl Display {
 
     /// Time to wait for replies that would otherwise end up in the shell. `None` if none is due.
     pub(super) fn patience(&self) -> Option<Duration> {
-        const LEAST: Duration = Duration::from_millis(200);
-        const MOST: Duration = Duration::from_secs(1);
+        const MIN: Duration = Duration::from_millis(200);
+        const MAX: Duration = Duration::from_secs(1);
         let round_trip = self.connection.round_trip().unwrap_or_default();
-        self.connection.awaits_reply().then(|| (round_trip * 3 / 2).clamp(LEAST, MOST))
+        self.connection.awaits_reply().then(|| (round_trip * 3 / 2).clamp(MIN, MAX))
     }
 }
 

@@ -51,6 +51,11 @@ fn unfinished(state: &State) -> String {
     }
 }
 
+/// Follows the written files if they do not show the last edit.
+const OLDER_THAN_EDIT: &str = " (older than your last edit)";
+/// The render that followed the written files.
+const NEXT_RENDER: &str = "the render after it";
+
 /// What happened after the files were written.
 fn since(state: &State) -> String {
     if is_broken(state) {
@@ -64,15 +69,15 @@ fn since(state: &State) -> String {
     if !state.request.is_own() {
         let is_by_hand = written.iter().any(|written| written.shows.is_some());
         return match state.saving.own {
-            OwnImage { .. } if is_older => " (older than your last edit)".to_owned(),
+            OwnImage { .. } if is_older => OLDER_THAN_EDIT.to_owned(),
             OwnImage { .. } if is_by_hand => String::new(),
             OwnImage { fraction, .. } => {
-                format!("; the render after it is not finished ({:.0} %)", (fraction * 100.0).floor())
+                format!("; {NEXT_RENDER} is not finished ({:.0} %)", (fraction * 100.0).floor())
             }
         };
     }
     let is_after = written.iter().any(|written| written.generation != state.request.generation);
-    let next = if is_after { "the render after it" } else { "the render" };
+    let next = if is_after { NEXT_RENDER } else { "the render" };
     match (state.work.activity, &state.work.progress) {
         (Activity::Running { .. } | Activity::Cancelled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
@@ -150,6 +155,7 @@ mod tests {
     use super::*;
     use crate::Changed;
     use crate::fixtures::{TestUi, diagnostic, done, progress};
+    use crate::messages;
     use crate::pipeline::protocol::{Event, Stage, Status};
     use crate::scene::diagnostic::Severity;
 
@@ -172,12 +178,16 @@ mod tests {
         ui.worker(Event::Progress { generation: begun, progress: progress(0.5, None) });
         ui.press('l');
         ui.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
-        assert!(words(&ui.state).starts_with("wrote big.png; the render after it"), "{}", words(&ui.state));
+        assert!(
+            words(&ui.state).starts_with(&format!("wrote big.png; {NEXT_RENDER}")),
+            "{}",
+            words(&ui.state)
+        );
         ui.worker(done(begun, Vec::new(), false));
         ui.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&ui.state), format!("{made}; the render after it is not finished (50 %)"));
-        assert!(ui.text().contains("not saved · w saves it"), "the newest image: {}", ui.text());
+        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (50 %)"));
+        assert!(ui.text().contains(messages::NOT_SAVED), "the newest image: {}", ui.text());
     }
 
     #[test]
@@ -233,7 +243,7 @@ mod tests {
             ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
             ui.finish([30, 30, 200]);
             let after = words(&ui.state);
-            assert_eq!(after, format!("{made} (older than your last edit)"), "{key}");
+            assert_eq!(after, format!("{made}{OLDER_THAN_EDIT}"), "{key}");
             assert_eq!(not_kept(&ui.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
             // A save without effect does not make it newer.
             ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
@@ -310,7 +320,7 @@ mod tests {
         ui.press('r');
         ui.worker(Event::Started { generation: 3 });
         ui.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
-        assert_eq!(words(&ui.state), format!("{made}; the render after it was stopped at 50 %"));
+        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 50 %"));
         ui.worker(Event::WriteFailed {
             generation: 3,
             path: None,
@@ -376,9 +386,9 @@ mod tests {
         let generation = ui.state.request.generation;
         ui.worker(Event::Started { generation });
         ui.worker(Event::Progress { generation, progress: progress(0.2, None) });
-        assert_eq!(words(&ui.state), format!("{made}; the render after it was stopped at 20 %"));
+        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} was stopped at 20 %"));
         ui.press(']');
-        assert_eq!(words(&ui.state), format!("{made}; the render after it is not finished (20 %)"));
+        assert_eq!(words(&ui.state), format!("{made}; {NEXT_RENDER} is not finished (20 %)"));
     }
 
     #[test]
@@ -398,8 +408,8 @@ mod tests {
         ui.finish([200, 30, 30]);
         assert_eq!(words(&ui.state), "cornell.png not finished (10 %)");
         let said = crate::view::status_line::not_saved(&ui.state);
-        assert_eq!(said, ["not saved · w saves it", "cornell.png at 10 %: 0 continues it"]);
-        assert!(ui.text().contains("not saved · w saves it"), "{}", ui.text());
+        assert_eq!(said, [messages::NOT_SAVED.to_owned(), messages::own_unfinished("cornell.png", 10)]);
+        assert!(ui.text().contains(messages::NOT_SAVED), "{}", ui.text());
         // `w` writes the image that is shown.
         ui.press('w');
         let generation = ui.state.request.generation;
@@ -410,7 +420,7 @@ mod tests {
         // Back at the scene's own image, the file does not show it yet.
         ui.press('0');
         ui.worker(Event::Started { generation: ui.state.request.generation });
-        assert!(words(&ui.state).starts_with(&format!("{made}; the render after it was stopped")));
+        assert!(words(&ui.state).starts_with(&format!("{made}; {NEXT_RENDER}")));
         let generation = ui.state.request.generation;
         ui.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
         ui.finish([30, 200, 30]);
@@ -419,6 +429,6 @@ mod tests {
         own(&mut ui, OwnState::Written);
         assert_eq!(words(&ui.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
         ui.event(crate::event::Event::Changed(Changed { noticed: ui.now }));
-        assert!(words(&ui.state).ends_with(" (older than your last edit)"), "{}", words(&ui.state));
+        assert!(words(&ui.state).ends_with(OLDER_THAN_EDIT), "{}", words(&ui.state));
     }
 }

@@ -1,4 +1,4 @@
-//! A scripted worker and a screen without a terminal, for tests.
+//! Scripted worker and UI without a terminal, for tests.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub(super) fn window(columns: u16, rows: u16) -> Window {
     Window { columns, rows, cell_aspect: 2.0, cell_pixels: (8, 16) }
 }
 
-/// A state that has not sent anything yet.
+/// A state that has not sent a request yet.
 pub(super) fn state(columns: u16, rows: u16) -> State {
     state_with(columns, rows, PreviewKind::HalfBlock, ColorDepth::TrueColor, Overrides::default())
 }
@@ -57,14 +57,14 @@ pub(super) fn state_with(
     State::new(setup, Instant::now())
 }
 
-/// A front end whose loop is the test.
+/// A user interface driven by a test instead of the event loop.
 pub(super) struct TestUi {
     pub state: State,
     pub now: Instant,
 }
 
 impl TestUi {
-    /// 80×24, started.
+    /// A UI of 80×24 cells that has sent its first request.
     pub(super) fn new() -> Self {
         Self::with(state(80, 24))
     }
@@ -75,7 +75,7 @@ impl TestUi {
         Self { state, now }
     }
 
-    /// One event; what is sent to the worker and the other effects.
+    /// Handles an event and returns its effects.
     pub(super) fn event(&mut self, event: Event) -> Vec<Effect> {
         update(&mut self.state, event, self.now)
     }
@@ -97,7 +97,7 @@ impl TestUi {
         self.event(Event::Tick)
     }
 
-    /// A render from beginning to end, its picture in one color.
+    /// Simulates a complete render of a uniform image.
     pub(super) fn finish(&mut self, color: [u8; 3]) {
         let generation = self.state.request.generation;
         self.worker(protocol::Event::Started { generation });
@@ -125,7 +125,7 @@ impl TestUi {
         self.worker(protocol::Event::Failed { generation, failure: Failure::Scene(diagnostics) });
     }
 
-    /// The screen as it is drawn now.
+    /// Draws the screen.
     pub(super) fn screen(&mut self) -> Buffer {
         self.state.dirty = false;
         let mut buffer =
@@ -139,14 +139,14 @@ impl TestUi {
     }
 }
 
-/// The rows of a buffer.
+/// The rows of a buffer as text.
 pub(super) fn text(buffer: &Buffer) -> String {
     let width = usize::from(buffer.area.width).max(1);
     let rows = buffer.content.chunks(width);
     rows.map(|row| row.iter().map(|cell| cell.symbol()).collect::<String>() + "\n").collect()
 }
 
-/// The request among effects.
+/// The render request among the effects.
 pub(super) fn request(effects: &[Effect]) -> Option<&Request> {
     effects.iter().find_map(|effect| match effect {
         Effect::Send(Command::Render(request)) => Some(&**request),
@@ -178,12 +178,12 @@ pub(super) fn settings() -> Effective {
     }
 }
 
-/// Settings of the scene itself.
+/// Settings of the scene file.
 pub(super) fn own() -> OwnSettings {
     OwnSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
 }
 
-/// At (0, 1, 4), which looks along −z at a point 4 away.
+/// A camera at (0, 1, 4) that looks along −z at a point at distance 4.
 pub(super) fn camera() -> Viewpoint {
     let pose = Pose { position: DVec3::new(0.0, 1.0, 4.0), look_at: DVec3::Y, up: DVec3::Y };
     Viewpoint { pose, fov: 40.0, aperture: 0.1, focus: 4.0 }
@@ -245,7 +245,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
     protocol::Event::Done { generation, report: Box::new(report), warnings, unchanged }
 }
 
-/// An error on the third line of a scene.
+/// A diagnostic on the third line of a scene.
 pub(super) fn diagnostic(severity: Severity, message: &str) -> Diagnostic {
     let source: Arc<str> = Arc::from("[render]\nwidth = 4\nheigth = 4\n");
     Diagnostic {

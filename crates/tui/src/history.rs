@@ -12,7 +12,7 @@ use crate::rescale::resized;
 use crate::state::ImageOrigin;
 
 /// Maximum memory of all images and scene texts.
-const MOST_BYTES: usize = 16 << 20;
+const MAX_BYTES: usize = 16 << 20;
 /// Maximum width and height of a thumbnail, as fine as octants can show.
 const SMALL: f32 = 32.0;
 
@@ -33,7 +33,7 @@ pub(crate) struct ShownImage {
 
 impl ShownImage {
     /// Whether both show the same image, regardless of their samples and size.
-    pub(crate) fn is_of_same_image(&self, other: &Self) -> bool {
+    pub(crate) fn shows_same_image(&self, other: &Self) -> bool {
         let images = self.source.zip(other.source);
         images.is_some_and(|(own, other)| own.image == other.image)
     }
@@ -119,7 +119,7 @@ impl History {
     }
 
     /// Transfers the entry of a request to the next one, which shows the same image differently.
-    pub(super) fn go_on(&mut self, generation: u64) {
+    pub(super) fn transfer_to_next(&mut self, generation: u64) {
         for past in self.past.iter_mut().filter(|past| past.shown.generation == generation) {
             past.shown.generation = generation + 1;
         }
@@ -139,10 +139,10 @@ impl History {
                     self.read_edits = past.edits;
                 }
                 // An image keeps its original origin.
-                let is_same = known.is_none() || past.shown.is_of_same_image(&shown);
-                let origin = if is_same { past.origin.of_same_image(origin) } else { origin };
+                let is_same = known.is_none() || past.shown.shows_same_image(&shown);
+                let origin = if is_same { past.origin.for_same_image(origin) } else { origin };
                 self.replace(at, (shown, time), origin);
-                self.unite(at);
+                self.merge_with_previous(at);
             }
             None => {
                 let edits = self.read_edits;
@@ -151,7 +151,7 @@ impl History {
                 self.compare(self.past.len() - 1);
             }
         }
-        while self.past.len() > 1 && self.bytes() > MOST_BYTES {
+        while self.past.len() > 1 && self.bytes() > MAX_BYTES {
             self.remove(0);
         }
     }
@@ -175,7 +175,7 @@ impl History {
     }
 
     /// Merges a finished entry with the previous one if both show the same image.
-    fn unite(&mut self, at: usize) {
+    fn merge_with_previous(&mut self, at: usize) {
         let Some(before) = at.checked_sub(1) else { return };
         let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
         let Some((earlier, past)) = self.past.get(before).zip(self.past.get(at)) else { return };
@@ -183,7 +183,7 @@ impl History {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
-        let origin = earlier.origin.of_same_image(past.origin.clone());
+        let origin = earlier.origin.for_same_image(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
             (past.edits, past.run, past.origin) = (edits, run, origin);
@@ -280,7 +280,7 @@ impl History {
     }
 
     /// Stores a new image. Returns whether it stays hidden because an older one is being looked at.
-    pub(super) fn holds_back(&mut self, shown: &ShownImage) -> bool {
+    pub(super) fn hides_newer(&mut self, shown: &ShownImage) -> bool {
         if let Some((_, newest)) = &mut self.open {
             *newest = shown.clone();
         }
@@ -295,13 +295,13 @@ impl History {
     }
 
     /// Whether moving back by `back` entries, or forward if negative, returns to the newest one.
-    pub(super) fn leads_to_newest(&self, back: isize) -> bool {
+    pub(super) fn returns_to_newest(&self, back: isize) -> bool {
         let place = self.open.as_ref().and_then(|(at, _)| at.checked_add_signed(-back));
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
     /// Opens the last render before the last edit that changed the image.
-    pub(super) fn before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
+    pub(super) fn open_before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
         self.look_at(at, newest)
@@ -373,7 +373,7 @@ impl HistoryEntry {
     /// Whether another image is the same one. An image in progress differs from the finished one.
     fn is_same(&self, shown: &ShownImage, origin: &ImageOrigin) -> bool {
         let is_of_image =
-            self.shown.is_of_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
+            self.shown.shows_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
         // An unfinished image may look the same at first and then change.
         let may_change = origin.is_unfinished && !self.origin.is_unfinished;
         is_of_image || self.shown.picture == shown.picture && !may_change
@@ -497,12 +497,12 @@ mod tests {
         history.broken();
         edit(&mut history);
         history.record(shown(4, 20), Instant::now(), ImageOrigin::default());
-        let before = history.before_edit(shown(4, 20)).expect("a picture");
+        let before = history.open_before_edit(shown(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
         // Images changed with keys include the same edit.
         history.close();
         history.record(shown(5, 30), Instant::now(), ImageOrigin::default());
-        let before = history.before_edit(shown(5, 30)).expect("a picture");
+        let before = history.open_before_edit(shown(5, 30)).expect("a picture");
         assert_eq!(before.generation, 1);
     }
 
@@ -515,7 +515,7 @@ mod tests {
         history.edited();
         history.broken();
         history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
-        assert_eq!(history.before_edit(shown(3, 30)).expect("a picture").generation, 1);
+        assert_eq!(history.open_before_edit(shown(3, 30)).expect("a picture").generation, 1);
     }
 
     /// An image of which some or all samples are rendered.
@@ -583,7 +583,7 @@ mod tests {
         history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
         history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
         history.kept_camera(2);
-        let before = history.before_edit(shown(3, 30)).expect("a picture");
+        let before = history.open_before_edit(shown(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "the previous camera");
     }
 

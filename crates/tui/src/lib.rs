@@ -53,10 +53,10 @@ use glimt_base::{choice, film, math, system};
 use glimt_pipeline as pipeline;
 use glimt_scene as scene;
 
-pub use color::{ColorChoice, ColorDepth, in_xterm};
+pub use color::{ColorChoice, ColorDepth, xterm_rgb};
 pub use editor::editor;
 pub use graphics::PixelScreen;
-pub use mosaic::filled;
+pub use mosaic::filled_squares;
 pub use options::{Changed, ExitStatus, News, Options, PreviewChoice, TuiError, TuiOutcome};
 pub use probe::{Probe, ProbeReplies, probe};
 pub use run::run;

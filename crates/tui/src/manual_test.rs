@@ -1,5 +1,6 @@
-//! The front end in a real terminal with a worker that only pretends. The file named by `GLIMT_BY_HAND` stands for the
-//! scene: the word `broken` in it fails, `panic` panics, anything else renders. The key `w` panics in the front end.
+//! Runs the front end in a real terminal with a simulated worker. `GLIMT_MANUAL_SCENE` names the scene file:
+//! if it contains `broken`, reading fails; if it contains `panic`, the worker panics. The key `w` makes the
+//! front end panic.
 
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -17,9 +18,9 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 
 #[test]
-#[ignore = "needs a person at a terminal for a minute: cargo test --release -p glimt-tui --lib by_hand -- --ignored --nocapture"]
-fn by_hand() {
-    let scene = PathBuf::from(std::env::var("GLIMT_BY_HAND").unwrap_or_default());
+#[ignore = "interactive: cargo test --release -p glimt-tui --lib manual_test -- --ignored --nocapture"]
+fn interactive_session() {
+    let scene = PathBuf::from(std::env::var("GLIMT_MANUAL_SCENE").unwrap_or_default());
     let (commands, orders) = channel();
     let (sender, events) = channel();
     let (watcher, news) = channel();
@@ -36,7 +37,7 @@ fn by_hand() {
         cell_aspect: None,
         notify_after: None,
         commands: Box::new(move |command| {
-            assert!(!matches!(command, Command::Write), "w panics in the thread of the front end");
+            assert!(!matches!(command, Command::Write), "w panics in the front end's thread");
             commands.send(command).unwrap_or_default();
         }),
         events,
@@ -78,7 +79,7 @@ fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<
     }
 }
 
-/// Renders for two seconds; stops at the next order for a picture.
+/// Simulates a render of two seconds, stopped by the next command.
 fn pretend(
     request: &Request,
     orders: &Receiver<Command>,
@@ -89,7 +90,7 @@ fn pretend(
     let say = |event| events.send(event).unwrap_or_default();
     say(Event::Started { generation });
     let text = std::fs::read_to_string(&request.scene).unwrap_or_default();
-    assert!(!text.contains("panic"), "the file says panic");
+    assert!(!text.contains("panic"), "the file contains `panic`");
     if text.contains("broken") {
         let failure = Failure::Scene(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         say(Event::Failed { generation, failure });

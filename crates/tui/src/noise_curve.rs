@@ -1,7 +1,7 @@
 //! Noise over render time.
 
 /// Maximum number of points; when it is exceeded, every second point is dropped.
-const MOST: usize = 256;
+const MAX: usize = 256;
 /// Minimum ratio between the times of two points, since the time axis is logarithmic.
 const STEP: f64 = 1.02;
 
@@ -17,7 +17,7 @@ impl NoiseCurve {
             return;
         }
         self.0.push((seconds, noise));
-        if self.0.len() > MOST {
+        if self.0.len() > MAX {
             let mut index = 0;
             self.0.retain(|_| {
                 index += 1;
@@ -55,7 +55,7 @@ mod tests {
         for step in 0..2000 {
             curve.note(2.01 * 1.03_f64.powi(step), 0.04);
         }
-        assert!(curve.points().len() <= MOST);
+        assert!(curve.points().len() <= MAX);
         assert!(curve.points().windows(2).all(|pair| pair[0].0 < pair[1].0));
     }
 }

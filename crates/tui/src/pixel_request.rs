@@ -75,7 +75,7 @@ impl PixelRequest {
         }
     }
 
-    /// Message that the terminal does not support the protocol, and what does.
+    /// Message that the terminal does not support the protocol, listing terminals that do.
     pub(super) fn refusal(self) -> String {
         let (name, terminals) = match self.protocol {
             Protocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),

@@ -108,7 +108,7 @@ impl Presenter {
             is_shown,
             is_fast,
             is_in_pixels: self.display.draws_pixels(),
-            is_final: is_still(state),
+            is_final: is_final_preview(state),
             final_in: progress
                 .and_then(|progress| progress.eta_seconds)
                 .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()),
@@ -153,13 +153,13 @@ impl Presenter {
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);
         if let Some(title) = WindowTitle::of(state, self.display.bytes_per_second().is_some()) {
-            self.display.dress(title);
+            self.display.set_title(title);
         }
         let is_new = self.note_picture(state, now);
         // The first preview stays the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::of(state).preview;
-        self.display.place(view::preview::placement(state, area), is_still(state));
+        self.display.place(view::preview::placement(state, area), is_final_preview(state));
         let extras = self.extras(state, drawn);
         self.display.aim(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
@@ -197,7 +197,7 @@ impl Presenter {
 
     fn fidelity(&self, state: &State) -> Fidelity {
         match () {
-            () if is_still(state) => Fidelity::Still,
+            () if is_final_preview(state) => Fidelity::Still,
             () if self.drawn.is_refined => Fidelity::Following,
             () if self.drawn.is_first => Fidelity::First,
             () if self.display.is_fast() => Fidelity::Following,
@@ -235,8 +235,8 @@ fn samples(state: &State) -> f64 {
 }
 
 /// Whether the newest preview is final.
-fn is_still(state: &State) -> bool {
-    state.work.paused || !state.work.is_running() && view::status_line::goes_on(state).is_none()
+fn is_final_preview(state: &State) -> bool {
+    state.work.paused || !state.work.is_running() && view::status_line::last_good_progress(state).is_none()
 }
 
 /// Time at which the state needs a frame or a tick.

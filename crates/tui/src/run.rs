@@ -270,13 +270,13 @@ impl Ui {
         input::hold(true);
         self.screen.suspend();
         // While the terminal is not in raw mode, keys send signals.
-        let keys_of_child = signals::leave_keys_to_child();
-        terminal::lend();
+        let child_signals = signals::leave_signals_to_child();
+        terminal::save_modes();
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
-        terminal::take_back();
+        terminal::restore_modes();
         input::hold(false);
         let end = self.apply(Event::Back).or_else(|| self.redraw());
-        drop(keys_of_child);
+        drop(child_signals);
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))
     }
 

@@ -34,18 +34,19 @@ const RESCUE: Duration = Duration::from_millis(100);
 const WATCH: Duration = Duration::from_millis(500);
 
 /// Signals that the event loop handles.
-const MEANT: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
+const HANDLED_SIGNALS: [i32; 7] = [SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH];
 /// Other signals that terminate a program: the terminal is restored first.
-const OTHERS: [i32; 9] = [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
+const OTHER_SIGNALS: [i32; 9] =
+    [SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGSYS, SIGTRAP];
 
 /// The same for signals that only Linux has, including real-time signals.
 #[cfg(target_os = "linux")]
-fn of_linux() -> impl Iterator<Item = i32> {
+fn linux_signals() -> impl Iterator<Item = i32> {
     [libc::SIGPWR, libc::SIGSTKFLT].into_iter().chain(libc::SIGRTMIN()..=libc::SIGRTMAX())
 }
 
 #[cfg(not(target_os = "linux"))]
-fn of_linux() -> impl Iterator<Item = i32> {
+fn linux_signals() -> impl Iterator<Item = i32> {
     std::iter::empty()
 }
 
@@ -61,17 +62,19 @@ impl Listener {
     /// Starts the signal threads, which send to `events`.
     pub(super) fn start(events: &Sender<Event>) -> io::Result<Self> {
         let over = Arc::new(AtomicBool::new(false));
-        let mut signals = Signals::new(MEANT.into_iter().chain(OTHERS).chain(of_linux()).chain([MARK]))?;
-        let ear = SignalThread { over: Arc::clone(&over), events: events.clone() };
+        let mut signals = Signals::new(
+            HANDLED_SIGNALS.into_iter().chain(OTHER_SIGNALS).chain(linux_signals()).chain([MARK]),
+        )?;
+        let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
         thread::Builder::new().name("signals".to_owned()).spawn(move || {
             loop {
-                signals.wait().for_each(|number| ear.hear(number));
+                signals.wait().for_each(|number| handler.handle(number));
                 *rounds() += 1;
                 ROUNDS.1.notify_all();
             }
         })?;
-        let ear = SignalThread { over: Arc::clone(&over), events: events.clone() };
-        thread::Builder::new().name("terminal-watch".to_owned()).spawn(move || ear.watch_terminal())?;
+        let handler = SignalThread { over: Arc::clone(&over), events: events.clone() };
+        thread::Builder::new().name("terminal-watch".to_owned()).spawn(move || handler.watch_terminal())?;
         Ok(Self { over })
     }
 }
@@ -86,7 +89,7 @@ impl Drop for Listener {
 static HUNG_UP: AtomicBool = AtomicBool::new(false);
 
 /// Whether a child process handles signals from the keyboard.
-static KEYS_OF_CHILD: AtomicBool = AtomicBool::new(false);
+static CHILD_HANDLES_SIGNALS: AtomicBool = AtomicBool::new(false);
 
 /// Number of rounds in which all pending signals were handled.
 static ROUNDS: (Mutex<u64>, Condvar) = (Mutex::new(0), Condvar::new());
@@ -96,16 +99,16 @@ fn rounds() -> MutexGuard<'static, u64> {
 }
 
 /// Timeout for the signal thread. Handling takes microseconds, so it only expires if the thread is gone.
-const HEARING: Duration = Duration::from_secs(10);
+const SIGNAL_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Returns when all signals sent before have been handled. The first round may have started before the call,
 /// the second one has not.
-fn hear_what_came() {
+fn wait_for_pending_signals() {
     for _ in 0..2 {
         let before = rounds();
         let last = *before;
         if low_level::raise(MARK).is_ok() {
-            drop(ROUNDS.1.wait_timeout_while(before, HEARING, |now| *now == last));
+            drop(ROUNDS.1.wait_timeout_while(before, SIGNAL_TIMEOUT, |now| *now == last));
         }
     }
 }
@@ -151,20 +154,20 @@ fn pass_on(id: Pid, number: Number) {
 }
 
 /// Leaves keyboard signals to the child until the result is dropped.
-pub(super) fn leave_keys_to_child() -> KeysOfChild {
-    KEYS_OF_CHILD.store(true, Ordering::Release);
-    KeysOfChild(())
+pub(super) fn leave_signals_to_child() -> ChildSignalGuard {
+    CHILD_HANDLES_SIGNALS.store(true, Ordering::Release);
+    ChildSignalGuard(())
 }
 
-/// Guard returned by [`leave_keys_to_child`].
-pub(super) struct KeysOfChild(());
+/// Guard returned by [`leave_signals_to_child`].
+pub(super) struct ChildSignalGuard(());
 
-impl Drop for KeysOfChild {
+impl Drop for ChildSignalGuard {
     fn drop(&mut self) {
         // A key that ended the child also sent its signal to this process, which may not have been handled
         // yet.
-        hear_what_came();
-        KEYS_OF_CHILD.store(false, Ordering::Release);
+        wait_for_pending_signals();
+        CHILD_HANDLES_SIGNALS.store(false, Ordering::Release);
     }
 }
 
@@ -174,7 +177,7 @@ struct SignalThread {
 }
 
 impl SignalThread {
-    fn hear(&self, number: i32) {
+    fn handle(&self, number: i32) {
         if number == MARK {
             return;
         }
@@ -186,7 +189,7 @@ impl SignalThread {
                     return;
                 }
                 if !terminal::is_there() {
-                    return self.tell(Signal::Hangup);
+                    return self.notify(Signal::Hangup);
                 }
             }
             // Signals that only exist on Linux are not known to signal-hook.
@@ -195,8 +198,8 @@ impl SignalThread {
             }
             return;
         }
-        let is_of_keys = matches!(number, SIGINT | SIGQUIT | SIGTSTP | SIGCONT);
-        if is_of_keys && KEYS_OF_CHILD.load(Ordering::Acquire) {
+        let is_from_keyboard = matches!(number, SIGINT | SIGQUIT | SIGTSTP | SIGCONT);
+        if is_from_keyboard && CHILD_HANDLES_SIGNALS.load(Ordering::Acquire) {
             return;
         }
         let signal = match number {
@@ -209,20 +212,20 @@ impl SignalThread {
             SIGCONT => Signal::Continue,
             other => Signal::Other(other),
         };
-        self.tell(signal);
+        self.notify(signal);
     }
 
     fn watch_terminal(&self) {
         while !self.over.load(Ordering::Acquire) {
             thread::sleep(WATCH);
             if !terminal::is_there() {
-                self.tell(Signal::Hangup);
+                self.notify(Signal::Hangup);
                 return;
             }
         }
     }
 
-    fn tell(&self, signal: Signal) {
+    fn notify(&self, signal: Signal) {
         if signal == Signal::Hangup {
             HUNG_UP.store(true, Ordering::Release);
         }
@@ -231,7 +234,7 @@ impl SignalThread {
                 end_child(number);
             }
             let over = Arc::clone(&self.over);
-            thread::spawn(move || end_later(signal, status, &over));
+            thread::spawn(move || end_after_grace(signal, status, &over));
         }
         // Without a receiver, the event loop has ended and needs no signal.
         let _ = self.events.send(Event::Signal(signal));
@@ -265,7 +268,7 @@ fn ends(signal: Signal) -> Option<ExitStatus> {
 
 /// Ends the process if the event loop did not. After a hangup there is no terminal to restore. A running
 /// child may have left the terminal in any mode.
-fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
+fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
     thread::sleep(GRACE);
     if signal != Signal::Hangup {
         if over.load(Ordering::Acquire) {
@@ -274,7 +277,7 @@ fn end_later(signal: Signal, status: ExitStatus, over: &AtomicBool) {
         terminal::rescue();
         thread::sleep(RESCUE);
     }
-    terminal::take_back();
+    terminal::restore_modes();
     low_level::exit(i32::from(status.0));
 }
 
@@ -306,7 +309,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn real_time_signals_are_handled() {
-        let heard: Vec<i32> = of_linux().collect();
+        let heard: Vec<i32> = linux_signals().collect();
         assert!(heard.contains(&libc::SIGRTMIN()) && heard.contains(&libc::SIGRTMAX()));
         assert_eq!(ends(Signal::Other(libc::SIGRTMAX())), Some(ExitStatus(128 + 64)));
     }

@@ -7,22 +7,22 @@ use ratatui::style::Style;
 use super::color::{self, ColorChoice, ColorDepth, ColorMapper};
 use super::event::Window;
 use super::options::PreviewChoice;
-use super::paint::in_lines;
+use super::paint::as_text_lines;
 use super::terminal;
-use super::view::preview::{PreviewColors, shown_by, size_in_cells};
+use super::view::preview::{PreviewColors, draw_image, size_in_cells};
 use super::view::text::{columns, shortened};
 use crate::film::Picture;
 
 /// Minimum width of a terminal that shows images.
-const LEAST_COLUMNS: u16 = 30;
+const MIN_COLUMNS: u16 = 30;
 /// Minimum width of images that are side by side.
-const LEAST_BESIDE: u16 = 20;
+const MIN_BESIDE: u16 = 20;
 /// Columns between images.
 const GAP: u16 = 2;
 /// Rows of the terminal reserved for text.
 const WORDS: u16 = 17;
 /// Height of an image in a terminal with fewer rows.
-const LEAST_ROWS: u16 = 7;
+const MIN_ROWS: u16 = 7;
 
 /// An image and its caption.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
     let (size, aspect) = if is_terminal { room(&terminal::window(None)) } else { ((80, 24), 2.0) };
     let buffers = laid_out(pictures, inks, size, aspect);
-    buffers.iter().map(|buffer| in_lines(buffer, depth != ColorDepth::None)).collect()
+    buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
 /// Window size and cell aspect; some terminals report a size of 0.
@@ -62,10 +62,10 @@ fn laid_out(
 ) -> Vec<Buffer> {
     let count = pictures.len().max(1) as u16;
     let beside = across.saturating_sub(GAP * (count - 1)) / count;
-    let rows = down.saturating_sub(WORDS).max(LEAST_ROWS);
-    if across < LEAST_COLUMNS {
+    let rows = down.saturating_sub(WORDS).max(MIN_ROWS);
+    if across < MIN_COLUMNS {
         Vec::new()
-    } else if beside >= LEAST_BESIDE {
+    } else if beside >= MIN_BESIDE {
         vec![row(pictures, inks, (beside, rows), aspect)]
     } else {
         pictures.chunks(1).map(|one| row(one, inks, (across, rows), aspect)).collect()
@@ -82,7 +82,7 @@ fn row(pictures: &[NamedImage], inks: PreviewColors<'_>, room: (u16, u16), aspec
     for (x, one) in (0..).step_by(usize::from(stride)).zip(pictures) {
         buffer.set_string(x, 0, shortened(&one.name, room.0), Style::new());
         let area = Rect::new(x, 1, width, height);
-        buffer.merge(&shown_by(&one.picture, PreviewChoice::HalfBlock, inks, (area, aspect)));
+        buffer.merge(&draw_image(&one.picture, PreviewChoice::HalfBlock, inks, (area, aspect)));
     }
     buffer
 }
@@ -99,7 +99,7 @@ mod tests {
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
         let buffers =
             laid_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
-        let text: String = buffers.iter().map(|buffer| in_lines(buffer, false)).collect();
+        let text: String = buffers.iter().map(|buffer| as_text_lines(buffer, false)).collect();
         text.lines().map(str::to_owned).collect()
     }
 

@@ -103,7 +103,7 @@ impl TerminalSession {
 
     /// Restores the terminal until [`TerminalSession::resume`].
     pub(super) fn suspend(&mut self) {
-        give_back();
+        restore();
     }
 
     /// Sets up the terminal again.
@@ -136,21 +136,21 @@ impl TerminalSession {
 
 impl Drop for TerminalSession {
     fn drop(&mut self) {
-        give_back();
+        restore();
     }
 }
 
 /// Terminal modes before another program got the terminal. `None` at other times.
 static LENT: Mutex<Option<Termios>> = Mutex::new(None);
 
-/// Saves the terminal modes for [`take_back`] before another program uses the terminal.
-pub(super) fn lend() {
+/// Saves the terminal modes for [`restore_modes`] before another program uses the terminal.
+pub(super) fn save_modes() {
     *LENT.lock().unwrap_or_else(PoisonError::into_inner) = tcgetattr(io::stdin()).ok();
 }
 
-/// Restores the modes saved by [`lend`], since a killed program may leave its own. Errors are ignored because
+/// Restores the modes saved by [`save_modes`], since a killed program may leave its own. Errors are ignored because
 /// nothing can be done about them.
-pub(super) fn take_back() {
+pub(super) fn restore_modes() {
     if let Some(modes) = LENT.lock().unwrap_or_else(PoisonError::into_inner).take() {
         let _ = tcsetattr(io::stdin(), SetArg::TCSANOW, &modes);
     }
@@ -161,11 +161,11 @@ fn take() -> io::Result<()> {
     RAW.store(true, Ordering::Release);
     TAKEN.store(true, Ordering::Release);
     *OWNER.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current().id());
-    enter(&mut io::stdout()).inspect_err(|_| give_back())
+    enter(&mut io::stdout()).inspect_err(|_| restore())
 }
 
 /// Restores the terminal if it is in use. Errors are ignored because they cannot be reported.
-fn give_back() {
+fn restore() {
     leave_screen();
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
@@ -226,12 +226,12 @@ fn prepare_abort() {
         let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
         RestoreData { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
-    abort::set_terminal_restore(give_back_at_once);
+    abort::set_terminal_restore(restore_on_abort);
 }
 
 /// Restores the terminal using only async-signal-safe calls: no locks, no allocations. Waits at most
 /// [`STUCK`] for a terminal that accepts nothing.
-fn give_back_at_once() {
+fn restore_on_abort() {
     let Some(words) = LAST_WORDS.get() else { return };
     if TAKEN.swap(false, Ordering::AcqRel) {
         let out = io::stdout();
@@ -243,7 +243,7 @@ fn give_back_at_once() {
             if HAS_IMAGES.load(Ordering::Acquire) {
                 let _ = nix::unistd::write(&out, &words.delete_images);
             }
-            for bytes in taken_back() {
+            for bytes in undo_bytes() {
                 let _ = nix::unistd::write(&out, bytes);
             }
             let _ = nix::unistd::write(&out, &words.leave);
@@ -267,7 +267,7 @@ pub(super) fn will_report_focus() {
 }
 
 /// Bytes to send before setting a window title: they save the original one, the first time.
-pub(super) fn before_title() -> &'static [u8] {
+pub(super) fn title_saving_bytes() -> &'static [u8] {
     if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
 }
 
@@ -283,7 +283,7 @@ pub(super) fn will_have_links() {
 
 /// Bytes that undo the other changes. Each is returned once, except for modes, which are set again whenever
 /// the terminal is set up.
-fn taken_back() -> impl Iterator<Item = &'static [u8]> {
+fn undo_bytes() -> impl Iterator<Item = &'static [u8]> {
     let mut is_first = true;
     CHANGES.iter().flat_map(move |(flag, bytes)| {
         let is_mode = std::ptr::eq(*flag, &FOCUS);
@@ -313,7 +313,7 @@ fn leave(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
         leave_images(out)?;
     }
-    taken_back().try_for_each(|bytes| out.write_all(bytes))?;
+    undo_bytes().try_for_each(|bytes| out.write_all(bytes))?;
     leave_text(out)
 }
 
@@ -348,7 +348,7 @@ fn chain_panic_hook() {
             if TAKEN.load(Ordering::Acquire) && owner != Some(std::thread::current().id()) {
                 *PANIC.lock().unwrap_or_else(PoisonError::into_inner) = Some(info.to_string());
             } else {
-                give_back();
+                restore();
                 previous(info);
             }
         }));
@@ -400,15 +400,15 @@ pub(super) fn window(cell_aspect: Option<f32>) -> Window {
 }
 
 /// Maximum number of columns drawn, more than any wall of screens has.
-const MOST_COLUMNS: u16 = 4096;
+const MAX_COLUMNS: u16 = 4096;
 /// Maximum number of cells drawn. Each takes hundreds of bytes, and terminals may report 65,535 columns and
 /// rows.
-const MOST_CELLS: u32 = 1 << 20;
+const MAX_CELLS: u32 = 1 << 20;
 
 /// Limits a window to the part that is drawn.
 fn bounded(window: Window) -> Window {
-    let columns = window.columns.min(MOST_COLUMNS);
-    let most_rows = MOST_CELLS / u32::from(columns.max(1));
+    let columns = window.columns.min(MAX_COLUMNS);
+    let most_rows = MAX_CELLS / u32::from(columns.max(1));
     let rows = u16::try_from(most_rows).map_or(window.rows, |most| window.rows.min(most));
     Window { columns, rows, ..window }
 }
@@ -462,14 +462,14 @@ mod tests {
     #[test]
     fn title_progress_and_links_are_undone_once() {
         let _alone = alone();
-        let all = || taken_back().collect::<Vec<_>>();
+        let all = || undo_bytes().collect::<Vec<_>>();
         assert!(all().is_empty());
-        assert_eq!((before_title(), before_title()), (KEEP_TITLE, &b""[..]));
+        assert_eq!((title_saving_bytes(), title_saving_bytes()), (KEEP_TITLE, &b""[..]));
         will_have_progress();
         will_have_links();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
-        assert_eq!(before_title(), KEEP_TITLE, "saved again when set again");
+        assert_eq!(title_saving_bytes(), KEEP_TITLE, "saved again when set again");
         assert_eq!(all(), [STRING_END, TITLE_BACK]);
     }
 
@@ -508,7 +508,7 @@ mod tests {
         }
         for (columns, rows) in [(32_767, 32_767), (u16::MAX, u16::MAX), (u16::MAX, 1), (300, u16::MAX)] {
             let drawn = of(columns, rows);
-            assert!(u32::from(drawn.0) * u32::from(drawn.1) <= MOST_CELLS, "{drawn:?}");
+            assert!(u32::from(drawn.0) * u32::from(drawn.1) <= MAX_CELLS, "{drawn:?}");
             assert!(drawn.0 >= columns.min(300) && drawn.1 >= rows.min(256), "{drawn:?}");
         }
     }
@@ -524,7 +524,7 @@ mod tests {
     fn restoring_an_unused_terminal_does_nothing() {
         let _alone = alone();
         assert!(!TAKEN.load(Ordering::Acquire));
-        give_back();
+        restore();
         rescue();
         assert!(!TAKEN.load(Ordering::Acquire));
     }

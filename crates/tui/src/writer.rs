@@ -116,12 +116,12 @@ pub(super) fn discard(patience: Duration) -> bool {
     waiting = wait(waiting, patience);
     let is_whole = !waiting.is_writing;
     waiting.is_given_up = !is_whole;
-    drop(wait(waiting, 2 * LOOK));
+    drop(wait(waiting, 2 * POLL_INTERVAL));
     is_whole
 }
 
 /// Poll interval while the terminal accepts nothing.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Writes all bytes unless `is_given_up` returns true.
 pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn() -> bool) -> io::Result<()> {
@@ -135,7 +135,7 @@ pub(super) fn write_all(out: &mut File, mut bytes: &[u8], is_given_up: impl Fn()
                     return Ok(());
                 }
                 let mut ends = [PollFd::new(out.as_fd(), PollFlags::POLLOUT)];
-                let look = PollTimeout::try_from(LOOK).unwrap_or(PollTimeout::ZERO);
+                let look = PollTimeout::try_from(POLL_INTERVAL).unwrap_or(PollTimeout::ZERO);
                 // The next write reports any error.
                 let _ = poll(&mut ends, look);
             }

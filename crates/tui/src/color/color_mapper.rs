@@ -37,7 +37,7 @@ struct ColorPair {
     colors: [usize; 2],
 }
 
-/// Maps colors to those of a terminal.
+/// Maps sRGB colors to terminal colors.
 #[derive(Debug)]
 pub(crate) struct ColorMapper {
     depth: ColorDepth,
@@ -55,7 +55,7 @@ impl ColorMapper {
         match depth {
             ColorDepth::TrueColor | ColorDepth::None => {}
             ColorDepth::Indexed256 => {
-                let inks = (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed).map(Ink::plain);
+                let inks = (palette::FIRST_FIXED..=u8::MAX).filter_map(palette::fixed_color).map(Ink::plain);
                 shades.plain = RefCell::new(Mixer::new(inks.collect(), CALM_256));
             }
             ColorDepth::Ansi16 => {

@@ -59,7 +59,7 @@ pub(crate) fn ansi(term: &str) -> &'static AnsiColors {
 }
 
 /// The sRGB value of a palette color. `None` for the first 16, which the user can change.
-pub(crate) fn fixed(index: u8) -> Option<[u8; 3]> {
+pub(crate) fn fixed_color(index: u8) -> Option<[u8; 3]> {
     match index {
         0..FIRST_FIXED => None,
         FIRST_FIXED..FIRST_GRAY => {
@@ -71,11 +71,13 @@ pub(crate) fn fixed(index: u8) -> Option<[u8; 3]> {
 }
 
 /// The sRGB value of a color with xterm's defaults. `None` for the default color.
-pub fn in_xterm(color: Color) -> Option<[u8; 3]> {
+pub fn xterm_rgb(color: Color) -> Option<[u8; 3]> {
     let ansi = match color {
         Color::Reset => return None,
         Color::Rgb(r, g, b) => return Some([r, g, b]),
-        Color::Indexed(index) => return fixed(index).or_else(|| XTERM.get(usize::from(index)).copied()),
+        Color::Indexed(index) => {
+            return fixed_color(index).or_else(|| XTERM.get(usize::from(index)).copied());
+        }
         Color::Black => 0,
         Color::Red => 1,
         Color::Green => 2,
@@ -145,20 +147,23 @@ mod tests {
             ([118, 118, 118], 243),
         ] {
             assert_eq!(nearest_256(rgb), index, "{rgb:?}");
-            assert!(fixed(index).is_some_and(|fixed| difference(fixed, rgb) <= 36), "{rgb:?}");
+            assert!(
+                fixed_color(index).is_some_and(|fixed_color| difference(fixed_color, rgb) <= 36),
+                "{rgb:?}"
+            );
         }
-        assert_eq!(fixed(15), None);
-        let shown = [Color::Indexed(9), Color::LightRed, Color::Indexed(67), Color::Reset].map(in_xterm);
+        assert_eq!(fixed_color(15), None);
+        let shown = [Color::Indexed(9), Color::LightRed, Color::Indexed(67), Color::Reset].map(xterm_rgb);
         assert_eq!(shown, [Some([255, 0, 0]), Some([255, 0, 0]), Some([95, 135, 175]), None]);
     }
 
     #[test]
     fn no_256_color_index_is_much_nearer() {
-        let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed).collect();
+        let palette: Vec<[u8; 3]> = (FIRST_FIXED..=255).filter_map(fixed_color).collect();
         assert_eq!(palette.len(), 240);
         for i in 0..4096_u32 {
             let rgb = [0, 8, 16].map(|shift| (i.wrapping_mul(2_654_435_761) >> shift) as u8);
-            let got = difference(rgb, fixed(nearest_256(rgb)).expect("a fixed color"));
+            let got = difference(rgb, fixed_color(nearest_256(rgb)).expect("a fixed color"));
             let best = palette.iter().map(|&other| difference(rgb, other)).min().expect("240 colors");
             assert!(f64::from(got).sqrt() <= f64::from(best).sqrt() + 12.0, "{rgb:?}: {got} {best}");
         }

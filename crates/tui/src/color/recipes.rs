@@ -16,7 +16,7 @@ pub(super) const PARTS: usize = 16;
 /// Candidate inks per recipe: those nearest to the color.
 const NEAREST: usize = 32;
 /// Maximum number of cached recipes.
-const MOST_RECIPES: usize = 1 << 16;
+const MAX_RECIPES: usize = 1 << 16;
 
 /// A color or pattern to mix from.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +73,7 @@ impl Mixer {
     }
 
     fn remember(&mut self, rgb: [u8; 3]) -> [u16; PARTS] {
-        if self.recipes.len() >= MOST_RECIPES {
+        if self.recipes.len() >= MAX_RECIPES {
             self.recipes.clear();
         }
         let recipe = self.recipe(rgb);
@@ -120,17 +120,17 @@ mod tests {
     use crate::color::palette;
 
     fn cube() -> Mixer {
-        Mixer::new((16..=255).filter_map(palette::fixed).map(Ink::plain).collect(), 0.1)
+        Mixer::new((16..=255).filter_map(palette::fixed_color).map(Ink::plain).collect(), 0.1)
     }
 
     #[test]
     fn ink_colors_are_not_dithered() {
         let mut mixer = cube();
         for index in [0, 5, 100, 215, 230] {
-            let rgb = palette::fixed(16 + index).expect("a fixed color");
+            let rgb = palette::fixed_color(16 + index).expect("a fixed color");
             for part in 0..PARTS {
                 let ink = mixer.ink(rgb, (part as f32 + 0.5) / PARTS as f32);
-                assert_eq!(palette::fixed(16 + ink as u8), Some(rgb));
+                assert_eq!(palette::fixed_color(16 + ink as u8), Some(rgb));
             }
         }
     }

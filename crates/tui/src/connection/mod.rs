@@ -168,7 +168,7 @@ impl Connection {
                 let round_trip = now.saturating_duration_since(slice.sent);
                 self.round_trips.add(round_trip, now);
                 self.note_recent(round_trip);
-                self.fit(&slice, round_trip, now);
+                self.adjust_window(&slice, round_trip, now);
             }
         }
     }
@@ -258,7 +258,7 @@ impl Connection {
     }
 
     /// Adjusts the window to the queueing delay of a slice.
-    fn fit(&mut self, slice: &SentSlice, round_trip: Duration, now: Instant) {
+    fn adjust_window(&mut self, slice: &SentSlice, round_trip: Duration, now: Instant) {
         let Some(least) = self.round_trips.least() else { return };
         let queue = round_trip.saturating_sub(least);
         if queue <= MAX_QUEUE {

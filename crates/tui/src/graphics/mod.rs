@@ -52,7 +52,7 @@ impl PartialEq for PixelPlacement {
 /// Approximate bytes per pixel; noise hardly compresses.
 const PIXEL_BYTES: f64 = 2.0;
 /// Maximum size of an image. tmux passes on less than a megabyte.
-const MOST_BYTES: f64 = 600_000.0;
+const MAX_BYTES: f64 = 600_000.0;
 /// Maximum time to send an intermediate and a final image.
 const MOVING_SECONDS: f64 = 0.4;
 const STILL_SECONDS: f64 = 1.5;
@@ -138,7 +138,7 @@ impl Images {
     fn encode(&mut self, rate: Option<f64>) {
         let Some(wanted) = self.wanted.clone() else { return };
         let seconds = if self.is_still { STILL_SECONDS } else { MOVING_SECONDS };
-        let most = rate.map_or(MOST_BYTES, |rate| (rate * seconds).min(MOST_BYTES));
+        let most = rate.map_or(MAX_BYTES, |rate| (rate * seconds).min(MAX_BYTES));
         let pixels = f64::from(wanted.picture.width) * f64::from(wanted.picture.height);
         let scale = (most / (PIXEL_BYTES * pixels).max(1.0)).sqrt().min(1.0);
         let side = |length: u32| ((f64::from(length) * scale) as u32).max(1);

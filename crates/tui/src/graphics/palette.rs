@@ -10,7 +10,7 @@ use crate::color::{PaletteDither, dithered_to_6_bits};
 use crate::film::Picture;
 
 /// Maximum number of colors: registers below 16 belong to the terminal.
-const MOST: usize = 240;
+const MAX: usize = 240;
 /// Bits per channel of the histogram.
 const BITS: u32 = 6;
 /// A palette is kept while its RMS error is at most `WORSE` times that of a new one plus `ALLOWED` codes.
@@ -105,7 +105,7 @@ impl ColorBox {
 /// Splits the worst box until there are enough or all are exact. Returns the mean colors of the boxes.
 fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::of(bins, 0..bins.len())];
-    while boxes.len() < MOST {
+    while boxes.len() < MAX {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));
         let Some(worst) = worst.filter(|worst| boxes[*worst].error > 0.0) else { break };
         let ColorBox { bins: range, mean, axis, .. } = boxes.swap_remove(worst);

@@ -22,12 +22,12 @@ const LONE_ESCAPE: Duration = Duration::from_millis(50);
 const SEQUENCE: Duration = Duration::from_secs(1);
 /// Maximum duration and length of a sequence: alt-`]` starts one that no key ends.
 const LONGEST: Duration = Duration::from_secs(2);
-const MOST_BYTES: usize = 4096;
+const MAX_BYTES: usize = 4096;
 /// Time after an escape key during which `[` may still be part of a sequence.
-const REGRET: Duration = Duration::from_secs(2);
+const LATE_SEQUENCE: Duration = Duration::from_secs(2);
 /// Time to wait for the byte after such a `[`, and the maximum number of bytes held back.
-const DOUBT: Duration = Duration::from_millis(300);
-const LONGEST_ANSWER: usize = 32;
+const DOUBT_TIMEOUT: Duration = Duration::from_millis(300);
+const MAX_DOUBTFUL_BYTES: usize = 32;
 
 /// Decodes bytes into input.
 #[derive(Default)]
@@ -86,7 +86,7 @@ impl Decoder {
             PendingSequence::Escape => after(LONE_ESCAPE),
             PendingSequence::StringEnd => after(SEQUENCE),
             PendingSequence::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
-            PendingSequence::Doubtful(_) => after(DOUBT),
+            PendingSequence::Doubtful(_) => after(DOUBT_TIMEOUT),
             PendingSequence::Paste(paste) => Some(paste.deadline()),
         }
     }
@@ -139,7 +139,7 @@ impl Decoder {
                 if introducer == b'_' {
                     self.command.push(byte);
                 }
-                self.go_on(byte, (begin, bytes + 1, introducer), now);
+                self.continue_sequence(byte, (begin, bytes + 1, introducer), now);
             }
             PendingSequence::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
@@ -153,7 +153,7 @@ impl Decoder {
     }
 
     fn begin(&mut self, byte: u8, now: Instant) {
-        let escaped = self.escaped.take().filter(|escaped| now < *escaped + REGRET);
+        let escaped = self.escaped.take().filter(|escaped| now < *escaped + LATE_SEQUENCE);
         match byte {
             ESCAPE => {
                 self.meaning.forget();
@@ -180,17 +180,22 @@ impl Decoder {
                 self.press_escape();
                 self.begin(byte, now);
             }
-            _ => self.go_on(byte, (now, 2, byte), now),
+            _ => self.continue_sequence(byte, (now, 2, byte), now),
         }
     }
 
     /// Continues a sequence with one more byte.
-    fn go_on(&mut self, byte: u8, (begin, bytes, introducer): (Instant, usize, u8), now: Instant) {
+    fn continue_sequence(
+        &mut self,
+        byte: u8,
+        (begin, bytes, introducer): (Instant, usize, u8),
+        now: Instant,
+    ) {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
         if std::mem::take(&mut self.meaning.is_paste) {
             self.held = PendingSequence::Paste(Paste::new(now));
-        } else if bytes >= MOST_BYTES {
+        } else if bytes >= MAX_BYTES {
             self.give_up();
         } else if !self.meaning.has_ended {
             self.held = PendingSequence::Sequence { begin, bytes, introducer };
@@ -200,13 +205,13 @@ impl Decoder {
     fn follow_doubt(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
         let before = self.meaning.found.len();
         if (0x20..0x7f).contains(&byte) {
-            self.go_on(byte, (now, bytes.len(), b'['), now);
+            self.continue_sequence(byte, (now, bytes.len(), b'['), now);
         }
         let is_known = self.meaning.found.len() > before || matches!(self.held, PendingSequence::Paste(_));
         if is_known {
             return;
         }
-        let is_middle = matches!(byte, b' '..=b'?') && bytes.len() < LONGEST_ANSWER;
+        let is_middle = matches!(byte, b' '..=b'?') && bytes.len() < MAX_DOUBTFUL_BYTES;
         if is_middle {
             bytes.push(byte);
             self.held = PendingSequence::Doubtful(bytes);

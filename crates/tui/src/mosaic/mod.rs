@@ -4,5 +4,5 @@ mod fit;
 mod tile;
 
 pub(super) use self::fit::{FittedCell, fit};
-pub use self::tile::filled;
+pub use self::tile::filled_squares;
 pub(super) use self::tile::{Grid, PLACES, Tile, of_symbol};

@@ -68,7 +68,7 @@ pub(crate) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
 
 /// The squares of a cell that a character fills with the foreground, as 12 rows of 2 columns. `None` for
 /// other than block characters.
-pub fn filled(symbol: char) -> Option<[bool; 24]> {
+pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
     let mask = match symbol {
         ' ' => 0,
         '█' => ALL,

@@ -6,7 +6,7 @@ use super::terminal_color::{TerminalColor, digits};
 use crate::color::nearest_256;
 
 /// Maximum number of candidates for one part, and for both parts together.
-const MOST: usize = 6;
+const MAX: usize = 6;
 /// Number of following cells that a candidate may cover.
 const LONGEST: usize = 8;
 
@@ -34,10 +34,10 @@ pub(super) fn candidates(cells: &[Option<Mosaic>], model: CostModel) -> Candidat
 }
 
 fn shades(wanted: &(impl Iterator<Item = TerminalColor> + Clone), model: CostModel) -> Vec<TerminalColor> {
-    let mut shades = Vec::with_capacity(MOST);
+    let mut shades = Vec::with_capacity(MAX);
     let Some(first) = wanted.clone().next() else { return shades };
     let mut add = |shade| {
-        if shades.len() < MOST && !shades.contains(&shade) {
+        if shades.len() < MAX && !shades.contains(&shade) {
             shades.push(shade);
         }
     };

@@ -17,7 +17,7 @@ pub(super) enum CellContent {
     /// Two colors and the tile that divides them. A blank is two halves of the same color.
     Mosaic(Mosaic),
     /// A character.
-    Text(Text),
+    Text(TextCell),
     /// The right half of a wide character.
     Covered,
 }
@@ -70,14 +70,14 @@ impl Mosaic {
 
 /// A character, possibly of several code points, with its style.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Text {
+pub(super) struct TextCell {
     pub(super) symbol: Box<str>,
     /// 1 or 2.
     pub(super) columns: u16,
     pub(super) pen: Pen,
 }
 
-impl Text {
+impl TextCell {
     /// Whether it is a single code point, one column wide.
     pub(super) fn is_plain(&self) -> bool {
         self.columns == 1 && self.symbol.chars().nth(1).is_none()
@@ -161,7 +161,7 @@ impl CellContent {
         let mosaic = harmless.contains(cell.modifier).then(|| Mosaic::of(symbol, fg, bg)).flatten();
         mosaic.map_or_else(
             || {
-                Self::Text(Text {
+                Self::Text(TextCell {
                     symbol: symbol.into(),
                     columns,
                     pen: Pen { fg, bg, modifier: cell.modifier, link: 0 },

@@ -28,7 +28,7 @@ pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>
         consider(with_return(&[], to.x));
     } else if from.y < to.y {
         let down = usize::from(to.y - from.y);
-        // A line feed alone depends on the tty's modes, so it always follows a carriage return.
+        // The effect of a line feed depends on the tty's modes, so it always follows a carriage return.
         if down <= 8 {
             consider(with_return(&vec![b'\n'; down], to.x));
         }

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 /// Bytes that end a hyperlink.
 pub const LINK_OFF: &[u8] = b"\x1b]8;;\x1b\\";
 /// Maximum number of hyperlinks per screen.
-const MOST: usize = 1000;
+const MAX: usize = 1000;
 
 /// Adjacent cells of one row and the URL that they link to.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl Hyperlinks {
         }
         let known = self.addresses.iter().position(|known| known == address);
         let index = known.unwrap_or_else(|| {
-            if self.addresses.len() < MOST {
+            if self.addresses.len() < MAX {
                 self.addresses.push(address.to_owned());
             }
             self.addresses.len() - 1

@@ -2,7 +2,7 @@
 //!
 //! A [`Painter`] knows what the screen shows because it sent everything there. It is given a target buffer
 //! and returns the bytes that lead there, slice by slice; a new target replaces the rest of the previous one.
-//! A cell is compared by the two colors of its parts, however they are drawn: `▀ ▄ █` and the space can show
+//! Cells are compared by the colors of their two parts, however they are drawn: `▀ ▄ █` and the space can show
 //! the same halves in several ways. The painter picks the way that costs the fewest bytes after the
 //! previously drawn cell.
 //!
@@ -40,7 +40,7 @@ pub use self::fidelity::Fidelity;
 pub use self::frame_pacing::{FrameTiming, PacingAdvice, advise};
 use self::hyperlinks::Hyperlinks;
 pub use self::hyperlinks::{Hyperlink, LINK_OFF};
-pub use self::lines::in_lines;
+pub use self::lines::as_text_lines;
 use self::picture::ByteBudget;
 pub use self::rep_support::can_repeat;
 use self::screen::{OutputSlice, ScreenModel, Stroke};

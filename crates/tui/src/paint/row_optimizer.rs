@@ -14,7 +14,7 @@ use crate::mosaic::{PLACES, Tile};
 const BEAM: usize = 5;
 /// Upper bound on the bytes needed to get from any pen and cursor to any other. Paths that are worse than the
 /// best by more cannot win.
-const MOST_BYTES: f32 = 46.0;
+const MAX_BYTES: f32 = 46.0;
 
 /// A cell of the row.
 #[derive(Clone, Copy, Debug)]
@@ -114,7 +114,7 @@ pub(super) fn plan_row(targets: &[TargetCell], start: RowStart, model: CostModel
 
 /// Extends the paths by one cell.
 fn step(last: &[DrawPath], target: TargetCell, wanted: &[Option<Mosaic>], model: CostModel) -> Vec<DrawPath> {
-    let mut beam = Beam { paths: Vec::with_capacity(BEAM), limit: MOST_BYTES * model.byte };
+    let mut beam = Beam { paths: Vec::with_capacity(BEAM), limit: MAX_BYTES * model.byte };
     let leave = match (target.wanted, target.shown) {
         (None, _) => 0.0,
         (Some(wanted), Some(shown)) => {

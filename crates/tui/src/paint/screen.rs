@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::cell::{CellContent, Glyph, Mosaic, Text};
+use super::cell::{CellContent, Glyph, Mosaic, TextCell};
 use super::cursor_moves::{self, CellPosition};
 use super::hyperlinks::{Hyperlinks, LINK_OFF};
 use super::pen::Pen;
@@ -20,7 +20,7 @@ pub(super) struct OutputSlice {
 #[derive(Clone, Debug)]
 pub(super) enum Stroke {
     /// A character.
-    Text { at: CellPosition, text: Text },
+    Text { at: CellPosition, text: TextCell },
     /// Two colors shown with one glyph in `count` cells, using REP if there are several.
     Mosaic { at: CellPosition, glyph: Glyph, mosaic: Mosaic, count: u16 },
     /// `count` blanks in the terminal's default background, or up to the end of the row if `None`.
@@ -39,7 +39,7 @@ impl Stroke {
     /// repeat ASCII characters only.
     pub(super) fn repeated(strokes: &[Self]) -> Vec<Self> {
         let mut shorter: Vec<Self> = Vec::with_capacity(strokes.len());
-        for run in strokes.chunk_by(Self::goes_on) {
+        for run in strokes.chunk_by(Self::last_good_progress) {
             let count = run.len() as u16;
             if let [Self::Mosaic { at, glyph: Glyph::Blank, mosaic, .. }, _, ..] = run
                 && run.len() > 1 + cursor_moves::control(count - 1, b'b').len()
@@ -53,7 +53,7 @@ impl Stroke {
     }
 
     /// Whether `next` draws the same in the next cell.
-    fn goes_on(&self, next: &Self) -> bool {
+    fn last_good_progress(&self, next: &Self) -> bool {
         if let (
             Self::Mosaic { at, glyph, mosaic, .. },
             Self::Mosaic { at: next_at, glyph: next_glyph, mosaic: next_mosaic, .. },

@@ -15,7 +15,7 @@ use super::terminal_color::TerminalColor;
 /// Maximum channel difference between equal first previews.
 const ALIKE: u8 = 2;
 /// Cells are not redrawn for noise below this threshold.
-const MOST_NOISE: u8 = 12;
+const MAX_NOISE: u8 = 12;
 
 /// The first preview of the request that the screen shows, per cell.
 #[derive(Debug, Default)]
@@ -144,7 +144,7 @@ impl StableCells {
 
 /// Noise threshold for a median difference.
 fn noise(median: usize) -> u8 {
-    u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MOST_NOISE)
+    u8::try_from(4 * median + 2).unwrap_or(u8::MAX).min(MAX_NOISE)
 }
 
 /// The largest channel difference; 255 if the colors cannot be compared.

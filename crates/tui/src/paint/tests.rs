@@ -186,7 +186,7 @@ enum PainterStep {
     Aim(Buffer, Fidelity),
     Slice(usize),
     Forget,
-    /// Another program writes to the screen and the painter is told.
+    /// Another program writes to the screen and the painter forgets its content.
     Litter,
 }
 

@@ -26,7 +26,7 @@ pub(crate) struct DisplayState {
     pub capabilities: Capabilities,
     /// Minimum duration of a render whose end is worth a notification. `None` for no notifications.
     pub notify_after: Option<Duration>,
-    /// Whether the window has the focus, as far as the terminal reports it.
+    /// Whether the window has the focus, according to the terminal.
     pub has_focus: bool,
     /// Whether the background is light.
     pub is_light: bool,
@@ -61,22 +61,22 @@ impl DisplayState {
     /// Pixels of the preview per cell, horizontally.
     pub(crate) fn pixels_across(&self) -> u32 {
         /// More pixels are not worth their bytes.
-        const MOST: u32 = 10;
+        const MAX: u32 = 10;
         /// Maximum pixels of the window: accumulating, developing and encoding a preview takes about 45 bytes
         /// per pixel.
-        const MOST_PIXELS: f32 = 2_400_000.0;
+        const MAX_PIXELS: f32 = 2_400_000.0;
         /// Maximum pixels for sixels, which take as much memory again.
-        const MOST_IN_SIXELS: f32 = 1_600_000.0;
+        const MAX_IN_SIXELS: f32 = 1_600_000.0;
         match self.kind {
             PreviewKind::Pixels(protocol) => {
                 let most = match protocol {
-                    Protocol::Sixel => MOST_IN_SIXELS,
-                    Protocol::Kitty | Protocol::Iterm => MOST_PIXELS,
+                    Protocol::Sixel => MAX_IN_SIXELS,
+                    Protocol::Kitty | Protocol::Iterm => MAX_PIXELS,
                 };
                 let window = &self.window;
                 let squares = f32::from(window.columns) * f32::from(window.rows) * window.cell_aspect;
                 let affordable = (most / squares.max(1.0)).sqrt() as u32;
-                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MOST)
+                u32::from(window.cell_pixels.0).min(affordable).clamp(1, MAX)
             }
             kind => kind.grid().map_or(1, Grid::columns),
         }

@@ -87,7 +87,7 @@ impl State {
         // While the scene is broken, the last valid one is rendered.
         let is_at_work = match work.activity {
             Activity::Running { .. } => true,
-            Activity::Waiting | Activity::Broken => request.camera.is_some() && self.work_goes_on(),
+            Activity::Waiting | Activity::Broken => request.camera.is_some() && self.is_scene_broken(),
             Activity::Done | Activity::Cancelled => false,
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
@@ -110,7 +110,7 @@ impl State {
     }
 
     /// Whether the scene failed, not its render.
-    fn work_goes_on(&self) -> bool {
+    fn is_scene_broken(&self) -> bool {
         self.overlays.problems.as_ref().is_none_or(|problems| problems.work.is_none())
     }
 

@@ -108,7 +108,7 @@ impl ImageOrigin {
 
     /// Origin of an image that a later request found again: later changes had no effect on it. But if the
     /// camera moved with keys is now in the scene, the later origin is returned.
-    pub(crate) fn of_same_image(&self, later: Self) -> Self {
+    pub(crate) fn for_same_image(&self, later: Self) -> Self {
         if self.toggles.camera.is_any() && !later.toggles.camera.is_any() {
             return later;
         }

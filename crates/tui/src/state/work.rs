@@ -94,10 +94,10 @@ impl WorkState {
 
     /// Stores the curve of a finished render.
     pub(crate) fn keep_curve(&mut self, origin: ImageOrigin) {
-        const MOST: usize = 16;
+        const MAX: usize = 16;
         self.curves.retain(|(other, _)| *other != origin);
         self.curves.push((origin, self.curve.clone()));
-        if self.curves.len() > MOST {
+        if self.curves.len() > MAX {
             self.curves.remove(0);
         }
     }

@@ -1,8 +1,9 @@
-//! Tests of keys on the camera: which pictures they request, how often, and the messages.
+//! Camera keys: requests and messages.
 
 use super::{BLUE, RED};
 use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol::{self, Command, Viewpoint, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
@@ -24,43 +25,43 @@ fn show(ui: &mut TestUi) -> Vec<crate::event::Effect> {
 }
 
 #[test]
-fn a_moved_camera_is_shown_and_not_written_until_it_goes_back() {
+fn moved_camera_is_shown_but_not_written() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let effects = ui.press('l');
     let moved = request(&effects).expect("a request");
     assert_eq!((moved.write, moved.force), (Writing::No, false));
     let text = ui.text();
-    assert!(text.contains("camera moved (preview only). w: save image"), "{text}");
-    assert!(text.lines().last().is_some_and(|line| line.contains("0 reset camera")), "{text}");
+    assert!(text.contains(messages::CAMERA_MOVED), "{text}");
+    assert!(text.lines().last().is_some_and(|line| line.contains("reset camera")), "{text}");
     show(&mut ui);
     let effects = ui.event(Event::Changed(Changed { noticed: ui.now }));
     let edited = request(&effects).expect("a request");
-    assert_eq!(edited.overrides.camera, moved.overrides.camera, "a save does not move it back");
+    assert_eq!(edited.overrides.camera, moved.overrides.camera, "a save does not reset it");
     assert_eq!(edited.write, Writing::No);
     let effects = ui.press('0');
     let own = request(&effects).expect("a request");
     assert_eq!((own.write, own.overrides.camera.is_any()), (Writing::Try, false));
-    assert!(!ui.text().contains("camera moved"));
+    assert!(!ui.text().contains(messages::CAMERA_MOVED));
 }
 
 #[test]
-fn of_many_steps_the_newest_is_rendered_once_the_one_before_is_seen() {
+fn newest_camera_step_follows_a_preview() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let effects = ui.press('l');
-    let first = request(&effects).expect("the first step at once").overrides.camera.pose.expect("a pose");
+    let first = request(&effects).expect("an immediate first step").overrides.camera.pose.expect("a pose");
     for key in ['l', 'l', 'k', '<'] {
-        assert!(ui.press(key).is_empty(), "the first has no picture yet");
+        assert!(ui.press(key).is_empty(), "the first step has no preview yet");
     }
     let effects = show(&mut ui);
-    let newest = request(&effects).expect("the newest").overrides.camera;
+    let newest = request(&effects).expect("a request of the newest step").overrides.camera;
     let pose = newest.pose.expect("a pose");
     assert!(pose.position.x > 2.9 * first.position.x && pose.position.y > 1.1, "{pose:?}");
     assert!(newest.fov.is_some_and(|fov| fov < 40.0));
-    assert!(show(&mut ui).is_empty(), "nothing waits any more");
-    assert!(request(&ui.press('l')).is_some(), "and the next goes at once");
-    // What is not a step goes at once, with all steps before it.
+    assert!(show(&mut ui).is_empty(), "no step is waiting");
+    assert!(request(&ui.press('l')).is_some(), "the next step is immediate");
+    // Other keys are immediate and include all previous steps.
     ui.press('l');
     let effects = ui.press('s');
     assert!(request(&effects).expect("a request").overrides.camera != newest);
@@ -68,7 +69,7 @@ fn of_many_steps_the_newest_is_rendered_once_the_one_before_is_seen() {
 }
 
 #[test]
-fn a_step_that_can_have_no_picture_holds_nothing_up() {
+fn steps_without_previews_do_not_block() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press('l');
@@ -77,22 +78,22 @@ fn a_step_that_can_have_no_picture_holds_nothing_up() {
     let diagnostics = vec![diagnostic(Severity::Error, "wrong")];
     let failure = protocol::Failure::Scene(diagnostics);
     let effects = ui.worker(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_none(), "the scene broke meanwhile: the last good one is rendered");
-    assert!(request(&show(&mut ui)).is_some(), "which is seen");
+    assert!(request(&effects).is_none(), "the last valid scene is rendered");
+    assert!(request(&show(&mut ui)).is_some(), "its preview arrives");
     ui.press('l');
     let generation = ui.state.request.generation;
     let failure = protocol::Failure::Work("no memory".to_owned());
     let effects = ui.worker(protocol::Event::Failed { generation, failure });
-    assert!(request(&effects).is_some(), "the work failed: the step that waited goes");
+    assert!(request(&effects).is_some(), "after a failure, the waiting step is sent");
     let mut ui = TestUi::with(state(80, 1));
     ui.finish(RED);
     for _ in 0..3 {
-        assert!(request(&ui.press('l')).is_some(), "there is no room for a picture");
+        assert!(request(&ui.press('l')).is_some(), "no room for a preview");
     }
 }
 
 #[test]
-fn the_arrows_scroll_the_errors_while_they_are_open() {
+fn arrows_scroll_open_diagnostics() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong {i}"))).collect());
@@ -100,18 +101,18 @@ fn the_arrows_scroll_the_errors_while_they_are_open() {
     assert!(ui.key(down).is_empty());
     assert!(ui.state.overlays.diagnostics.scroll > 0);
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(request(&ui.key(down)).is_some(), "closed, they move the camera");
+    assert!(request(&ui.key(down)).is_some(), "the closed pane leaves them to the camera");
 }
 
 #[test]
-fn before_a_scene_is_read_there_is_no_camera_to_move() {
+fn camera_keys_need_a_scene() {
     let mut ui = TestUi::new();
     assert!(ui.press('l').is_empty() && ui.press('>').is_empty() && ui.press(']').is_empty());
-    assert!(ui.text().contains("has not been read yet"));
+    assert!(ui.text().contains(messages::NO_SCENE));
 }
 
 #[test]
-fn exposure_starts_from_the_scene_s_own() {
+fn exposure_starts_from_the_scene() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.state.request.exposure = Some(1.0);
@@ -123,14 +124,14 @@ fn exposure_starts_from_the_scene_s_own() {
 }
 
 #[test]
-fn keys_that_are_held_come_to_an_end_and_say_so() {
+fn held_keys_stop_at_their_limits() {
     for (key, words) in [
-        ('+', "as near as keys go"),
-        ('-', "as far as keys go"),
-        ('<', "field of view 1°"),
-        ('>', "field of view 160°"),
-        ('[', "exposure −20"),
-        (']', "exposure +20"),
+        ('+', messages::CLOSEST.to_owned()),
+        ('-', messages::FARTHEST.to_owned()),
+        ('<', messages::field_limit(1.0)),
+        ('>', messages::field_limit(160.0)),
+        ('[', messages::exposure_limit("−20")),
+        (']', messages::exposure_limit("+20")),
     ] {
         let mut ui = TestUi::new();
         ui.finish(RED);
@@ -138,19 +139,16 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
             ui.press(key);
             show(&mut ui);
         }
-        assert!(ui.text().contains(words), "{key}: {}", ui.text());
+        assert!(ui.text().contains(&words), "{key}: {}", ui.text());
         let generation = ui.state.request.generation;
-        assert!(
-            ui.press(key).is_empty() && ui.state.request.generation == generation,
-            "{key}: nothing is rendered"
-        );
+        assert!(ui.press(key).is_empty() && ui.state.request.generation == generation, "{key}: no request");
         let view = ui.state.request.viewpoint().expect("a camera");
         assert!((0.0039..4001.0).contains(&view.pose.distance()), "{key}: {view:?}");
     }
 }
 
 #[test]
-fn what_is_back_where_the_scene_has_it_is_no_change() {
+fn reverted_changes_are_no_changes() {
     for keys in ["[]", "][", "<>", "><", "+-", "-+", "lh", "]]]]["] {
         let mut ui = TestUi::new();
         ui.finish(RED);
@@ -169,12 +167,12 @@ fn what_is_back_where_the_scene_has_it_is_no_change() {
         );
         let line = ui.text().lines().last().map(str::to_owned).unwrap_or_default();
         assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");
-        assert!(!ui.text().contains("camera moved"), "{keys}: {}", ui.text());
+        assert!(!ui.text().contains(messages::CAMERA_MOVED), "{keys}: {}", ui.text());
     }
 }
 
 #[test]
-fn the_call_s_own_exposure_is_no_change_either() {
+fn command_line_exposure_is_no_change() {
     let base = Overrides { exposure: Some(1.0), ..Overrides::default() };
     let mut ui = TestUi::with(state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base));
     ui.finish(RED);
@@ -185,7 +183,7 @@ fn the_call_s_own_exposure_is_no_change_either() {
 }
 
 #[test]
-fn the_scene_of_a_model_is_written_once_and_its_camera_is_kept() {
+fn model_scene_is_written_once() {
     use crate::pipeline::protocol::{Event as WorkerEvent, Kept};
     let mut ui = TestUi::new();
     ui.state.request.scene = "assets/vase.obj".into();
@@ -199,14 +197,14 @@ fn the_scene_of_a_model_is_written_once_and_its_camera_is_kept() {
     let generation = ui.state.request.generation;
     ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(!ui.text().contains("c keep"), "there is a scene already: {}", ui.text());
+    assert!(!ui.text().contains("c keep"), "the scene exists: {}", ui.text());
     assert_eq!(crate::exit_summary::not_kept(&ui.state), None);
     ui.press('l');
     ui.finish([200, 30, 30]);
-    assert!(crate::exit_summary::not_kept(&ui.state).is_some(), "it was moved since");
+    assert!(crate::exit_summary::not_kept(&ui.state).is_some(), "the camera moved again");
 }
 
-/// A save after which the scene has this camera.
+/// Saves a scene with this camera.
 fn save(ui: &mut TestUi, camera: Viewpoint) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
@@ -221,7 +219,7 @@ fn save(ui: &mut TestUi, camera: Viewpoint) {
     show(ui);
 }
 
-/// The camera that `c` orders to be written. `None` if it orders nothing.
+/// The camera that `c` asks to write. `None` if it does not.
 fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
     let is_order = |effect: Effect| match effect {
         Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),
@@ -236,7 +234,7 @@ fn moved_to(position: [f64; 3]) -> Viewpoint {
 }
 
 #[test]
-fn what_was_saved_of_a_moved_camera_is_named_before_c_writes_over_it() {
+fn conflicting_saves_are_listed_before_c() {
     let wide = |fov| Viewpoint { fov, ..camera() };
     let look_at = Viewpoint { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
     let both = Viewpoint { fov: 25.0, ..moved_to([0.0, 2.0, 4.0]) };
@@ -256,16 +254,14 @@ fn what_was_saved_of_a_moved_camera_is_named_before_c_writes_over_it() {
         let moved = ui.state.request.toggles.camera;
         save(&mut ui, saved);
         assert_eq!(kept(&mut ui), None, "{keys}");
-        let said = format!(
-            "error: {words} was saved since the keys moved the camera: press c again to write over it"
-        );
+        let said = format!("error: {words} {}", messages::CAMERA_CONFLICT);
         assert!(ui.text().contains(&said), "{keys}: {}", ui.text());
-        assert_eq!(kept(&mut ui), Some(saved.changed(&moved)), "{keys}: the second time it is meant");
+        assert_eq!(kept(&mut ui), Some(saved.changed(&moved)), "{keys}: the second time confirms");
     }
 }
 
 #[test]
-fn what_is_saved_after_that_is_named_again() {
+fn later_saves_are_listed_again() {
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
     ui.press('h');
@@ -275,14 +271,14 @@ fn what_is_saved_after_that_is_named_again() {
         assert_eq!(kept(&mut ui), None);
         assert!(ui.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", ui.text());
     }
-    // Moved on, it is still the camera that is meant.
+    // Moving on does not ask again.
     ui.press('h');
     show(&mut ui);
     assert!(kept(&mut ui).is_some());
 }
 
 #[test]
-fn what_was_saved_beside_a_moved_camera_stays_when_c_writes() {
+fn unmoved_settings_of_a_save_are_kept() {
     let saved = Viewpoint { fov: 25.0, ..camera() };
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
@@ -291,7 +287,7 @@ fn what_was_saved_beside_a_moved_camera_stays_when_c_writes() {
     save(&mut ui, saved);
     let moved = ui.state.request.toggles.camera;
     assert_eq!(kept(&mut ui), Some(saved.changed(&moved)));
-    // The plane in focus goes with what is looked at: it was not saved.
+    // The focus follows `look_at`, so the save did not change it.
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
     ui.state.request.toggles.camera.focus = Some(2.5);
@@ -301,7 +297,7 @@ fn what_was_saved_beside_a_moved_camera_stays_when_c_writes() {
 }
 
 #[test]
-fn keys_that_move_the_camera_from_a_saved_one_write_over_nothing_that_is_newer() {
+fn reset_camera_is_moved_without_conflict() {
     let mut ui = TestUi::with(state(160, 40));
     ui.finish(RED);
     ui.press('h');
@@ -313,13 +309,13 @@ fn keys_that_move_the_camera_from_a_saved_one_write_over_nothing_that_is_newer()
 }
 
 #[test]
-fn the_camera_of_a_model_is_saved_by_nobody() {
+fn model_camera_has_no_conflicts() {
     let mut ui = TestUi::with(state(160, 40));
     ui.state.request.scene = "assets/vase.obj".into();
     ui.finish(RED);
     ui.press('h');
     show(&mut ui);
-    // The model has another size by now, and is framed anew.
+    // The model has another size by now and is framed again.
     save(&mut ui, moved_to([0.0, 2.0, 4.0]));
     assert!(kept(&mut ui).is_some());
 }

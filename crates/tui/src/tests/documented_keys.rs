@@ -1,4 +1,4 @@
-//! The tables of keys in `docs/terminal.md`, beside the keymap.
+//! Compares the key tables in `docs/terminal.md` with the keymap.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -15,7 +15,7 @@ fn documented() -> BTreeSet<String> {
     cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).map(str::to_owned).collect()
 }
 
-/// The keys that the help writes.
+/// The keys in the help.
 fn written() -> BTreeSet<String> {
     let labels = KEYMAP.iter().map(|one| one.label).chain(OVERLAY.iter().map(|one| one.label));
     labels
@@ -26,13 +26,13 @@ fn written() -> BTreeSet<String> {
 }
 
 #[test]
-fn the_page_has_the_keys_of_the_program() {
+fn documented_keys_match_the_keymap() {
     let (documented, written) = (documented(), written());
     let missing: Vec<_> = written.difference(&documented).collect();
-    assert!(missing.is_empty(), "not on the page: {missing:?}");
+    assert!(missing.is_empty(), "not documented: {missing:?}");
     for key in documented.difference(&written) {
         let press = key.chars().next().filter(|_| key.chars().count() == 1).map(KeyPress::plain);
         let is_bound = press.is_some_and(|key| action(key).is_some() || overlay(key).is_some());
-        assert!(is_bound, "no key of the program: {key}");
+        assert!(is_bound, "not bound: {key}");
     }
 }

@@ -1,9 +1,10 @@
-//! Tests of edits, typos among them: which pictures are before them, how they are numbered, and what a render took.
+//! Edits and typos: history, numbering and render times.
 
 use super::{BLUE, RED, cells_of};
 use crate::Changed;
 use crate::event::{Event, FrameReport};
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol::{self, Kept, LastGoodEnd, PreviewSource, Stage, Status};
 use crate::pipeline::settings::Effective;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -11,21 +12,21 @@ use crate::scene::fingerprint::Fingerprint;
 
 const GREEN: [u8; 3] = [10, 200, 20];
 
-/// A save of this text, which is being read.
+/// Saves this text; the worker starts to read it.
 fn save(ui: &mut TestUi, text: &str) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Text { generation, text: text.into() });
 }
 
-/// A save that breaks the scene.
+/// Saves a scene with an error.
 fn typo(ui: &mut TestUi) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.event(Event::Settled);
 }
 
-/// Preview of an image, all samples of which are there or only some.
+/// A preview of an image with some or all of its samples.
 fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     let generation = ui.state.request.generation;
     let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
@@ -34,7 +35,7 @@ fn preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     ui.event(Event::Picture { generation, picture, range, section, lacks_photons, source });
 }
 
-/// The scene could be read.
+/// Reports a valid scene.
 fn read(ui: &mut TestUi) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -42,7 +43,7 @@ fn read(ui: &mut TestUi) {
     ui.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
 }
 
-/// The end of a request: its render stage took so many seconds, and its image all these.
+/// Finishes a request whose render stage took `seconds` and whose image took `of_image` seconds in total.
 fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
     let generation = ui.state.request.generation;
     let mut event = done(generation, Vec::new(), unchanged);
@@ -55,7 +56,7 @@ fn end(ui: &mut TestUi, unchanged: bool, seconds: f64, of_image: f64) {
 }
 
 #[test]
-fn a_typo_and_its_mend_are_no_edit_to_look_back_over() {
+fn fixed_typo_is_not_an_edit() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     ui.finish(RED);
@@ -64,24 +65,24 @@ fn a_typo_and_its_mend_are_no_edit_to_look_back_over() {
     preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     typo(&mut ui);
-    // The last good scene is shown again, where colors are mixed by other cells.
+    // The last valid scene is shown again, possibly dithered differently.
     preview(&mut ui, "dull", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
     preview(&mut ui, "dull", GREEN, true);
     end(&mut ui, true, 0.0, 1.0);
-    assert!(ui.text().contains("unchanged · run 2"), "{}", ui.text());
-    assert!(ui.text().contains("▸2 shininess") && !ui.text().contains("rendered again"), "{}", ui.text());
+    assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
+    assert!(ui.text().contains("▸2 shininess") && !ui.text().contains(messages::AGAIN), "{}", ui.text());
     ui.press('b');
     assert!(cells_of(&mut ui, RED) > 500, "{}", ui.text());
     let text = ui.text();
-    assert!(text.contains("picture 1 of 2, 0 s ago"), "{text}");
-    assert!(text.contains("\nbefore the last edit, shininess 60 → 6  "), "{text}");
+    assert!(text.contains(&format!("{}, 0 s ago", messages::render_of(1, 2))), "{text}");
+    assert!(text.contains(&format!("\n{}, shininess 60 → 6  ", messages::BEFORE_EDIT)), "{text}");
     assert!(text.contains("b newest") && !text.contains("b shows"), "{text}");
 }
 
 #[test]
-fn an_edit_of_a_comment_adds_no_picture_and_no_run() {
+fn comment_edit_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "a = 1 # one");
     read(&mut ui);
@@ -93,11 +94,11 @@ fn an_edit_of_a_comment_adds_no_picture_and_no_run() {
     end(&mut ui, true, 0.0, 1.0);
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     ui.press('b');
-    assert!(ui.text().contains("there is no picture from before an edit"), "{}", ui.text());
+    assert!(ui.text().contains(messages::NO_EARLIER_RENDER), "{}", ui.text());
 }
 
 #[test]
-fn a_save_that_only_writes_another_file_adds_no_picture() {
+fn output_edit_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "camera.fov = 40");
     read(&mut ui);
@@ -117,16 +118,16 @@ fn a_save_that_only_writes_another_file_adds_no_picture() {
     }
     ui.worker(event);
     let text = ui.text();
-    // It is written by another run, and made by the same edit.
-    assert!(text.contains("· run 3") && text.contains("▸3 camera.fov"), "{text}");
+    // Another render wrote it, but the same edit made it.
+    assert!(text.contains("· render 3") && text.contains("▸3 camera.fov"), "{text}");
     assert!(!text.contains("render.output"), "{text}");
     assert_eq!(ui.state.picture.history.len(), 2);
     ui.press('b');
-    assert!(ui.text().contains("before the last edit, camera.fov 40 → 44  "), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, camera.fov 40 → 44  ", messages::BEFORE_EDIT)), "{}", ui.text());
 }
 
 #[test]
-fn a_render_that_goes_on_counts_all_seconds_of_its_samples_and_is_one_picture() {
+fn resumed_render_counts_all_its_time() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "a = 1");
     read(&mut ui);
@@ -143,23 +144,23 @@ fn a_render_that_goes_on_counts_all_seconds_of_its_samples_and_is_one_picture() 
     let generation = ui.state.request.generation;
     let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..progress(0.5, None) };
     ui.worker(protocol::Event::Progress { generation, progress });
-    assert!(ui.text().contains("32/64 samples · 4.5 s"), "the clock goes on: {}", ui.text());
+    assert!(ui.text().contains("32/64 samples · 4.5 s"), "the time continues: {}", ui.text());
     preview(&mut ui, "first", BLUE, true);
     end(&mut ui, false, 4.23, 8.73);
     let text = ui.text();
     assert!(text.contains("render 8.73 s +2.9 s"), "{text}");
-    assert!(text.contains("8.73 s · run 2"), "{text}");
+    assert!(text.contains("8.73 s · render 2"), "{text}");
     assert_eq!(ui.state.picture.history.len(), 1, "{text}");
 }
 
-/// The request under way has a picture, which the terminal gets.
+/// Shows a preview on the terminal.
 fn shown(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     preview(ui, name, color, is_finished);
     let generation = ui.state.request.generation;
     ui.event(Event::Shown { generation });
 }
 
-/// The last good scene, which is rendered while the newest is broken, comes to an end.
+/// Ends the render of the last valid scene.
 fn last_good(ui: &mut TestUi, end: LastGoodEnd) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::LastGoodEnded { generation, end });
@@ -167,7 +168,7 @@ fn last_good(ui: &mut TestUi, end: LastGoodEnd) {
 
 const FINISHED: LastGoodEnd = LastGoodEnd::Finished { unchanged: false };
 
-/// A finished picture, and an edit that a typo follows during its render.
+/// A finished render, then an edit followed by a typo during its render.
 fn typo_during_a_render() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
@@ -181,17 +182,20 @@ fn typo_during_a_render() -> TestUi {
 }
 
 #[test]
-fn the_last_good_scene_is_the_picture_under_way_and_its_end_is_a_run() {
+fn last_good_render_is_counted_once() {
     let mut ui = typo_during_a_render();
     let newest = |ui: &mut TestUi| {
         let text = ui.text();
-        assert!(text.contains("▸2 shininess") && text.contains(" 1 first"), "{text}");
-        assert!(!text.contains("unfinished"), "{text}");
+        assert!(
+            text.contains("▸2 shininess") && text.contains(&format!(" 1 {}", messages::OPENED)),
+            "{text}"
+        );
+        assert!(!text.contains(messages::STOPPED), "{text}");
     };
     newest(&mut ui);
     last_good(&mut ui, FINISHED);
     assert_eq!(ui.state.work.renders, 2);
-    // The last picture of the render comes after its end.
+    // The last preview arrives after the end of the render.
     shown(&mut ui, "dull", BLUE, true);
     newest(&mut ui);
     for key in ['n', 'N'] {
@@ -203,25 +207,25 @@ fn the_last_good_scene_is_the_picture_under_way_and_its_end_is_a_run() {
     shown(&mut ui, "dull", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     newest(&mut ui);
-    assert!(ui.text().contains("unchanged · run 2"), "{}", ui.text());
+    assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
     save(&mut ui, "shininess = 5");
     read(&mut ui);
     shown(&mut ui, "duller", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.press('n');
-    assert!(ui.text().contains("picture 2 of 3, 0 s ago"), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(2, 3))), "{}", ui.text());
 }
 
 #[test]
-fn a_last_good_scene_that_is_stopped_is_unfinished() {
+fn stopped_last_good_render_is_marked() {
     let mut ui = typo_during_a_render();
     last_good(&mut ui, LastGoodEnd::Stopped);
-    assert!(ui.text().contains("▸– unfinished;"), "{}", ui.text());
+    assert!(ui.text().contains(&format!("▸– {}:", messages::STOPPED)), "{}", ui.text());
     assert_eq!(ui.state.work.renders, 1);
 }
 
 #[test]
-fn what_a_key_changes_of_the_last_good_scene_is_a_picture_with_a_number() {
+fn changed_last_good_render_has_a_number() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     read(&mut ui);
@@ -237,53 +241,73 @@ fn what_a_key_changes_of_the_last_good_scene_is_a_picture_with_a_number() {
         for is_finished in [false, true] {
             shown(&mut ui, name, [7, run, u8::from(is_finished)], is_finished);
             assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
-            assert!(ui.text().contains(" 1 first"), "{}", ui.text());
+            assert!(ui.text().contains(&format!(" 1 {}", messages::OPENED)), "{}", ui.text());
         }
         last_good(&mut ui, FINISHED);
         assert_eq!(ui.state.work.renders, u64::from(run));
         assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
     }
     ui.press('n');
-    assert!(ui.text().contains("picture 2 of 3, 0 s ago"), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(2, 3))), "{}", ui.text());
 }
 
 #[test]
-fn a_finished_picture_whose_run_is_not_known_is_not_called_unfinished() {
+fn complete_image_is_not_called_stopped() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('s');
     read(&mut ui);
-    // All samples are there, but the next key comes before the end of the request.
+    // All samples exist, but the next key comes before the end of the request.
     shown(&mut ui, "hard", GREEN, true);
     ui.press('s');
     ui.finish(BLUE);
     ui.press('n');
     let text = ui.text();
-    assert!(text.contains("older picture, 0 s ago") && !text.contains("unfinished"), "{text}");
+    assert!(
+        text.contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::OLDER)))
+            && !text.contains(messages::STOPPED),
+        "{text}"
+    );
 }
 
 #[test]
-fn the_number_of_a_picture_is_that_of_its_run() {
+fn entries_are_numbered_by_render() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
-    // A render that is stopped is no run.
+    // A stopped render is not counted.
     ui.press('s');
     read(&mut ui);
     preview(&mut ui, "hard", GREEN, false);
     ui.press('s');
     ui.finish(BLUE);
     let text = ui.text();
-    assert!(text.contains("· run 2") && text.contains("▸2 shadows off"), "{text}");
-    assert!(text.contains("– unfinished;") && text.contains(" 1 first"), "{text}");
+    assert!(text.contains("· render 2") && text.contains("▸2 shadows off"), "{text}");
+    assert!(
+        text.contains(&format!("– {}:", messages::STOPPED))
+            && text.contains(&format!(" 1 {}", messages::OPENED)),
+        "{text}"
+    );
     ui.press('n');
-    assert!(ui.text().contains("unfinished picture, 0 s ago"), "{}", ui.text());
-    assert!(ui.text().contains("unfinished; after shadows hard · n older · N newer"), "{}", ui.text());
+    assert!(
+        ui.text().contains(&format!("{}, 0 s ago", messages::unnumbered_render(messages::STOPPED))),
+        "{}",
+        ui.text()
+    );
+    assert!(
+        ui.text().contains(&format!(
+            "{}: shadows hard · {}",
+            messages::STOPPED,
+            messages::HISTORY_KEYS.join(" · ")
+        )),
+        "{}",
+        ui.text()
+    );
     ui.press('n');
-    assert!(ui.text().contains("picture 1 of 2, 0 s ago"), "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(1, 2))), "{}", ui.text());
 }
 
 #[test]
-fn the_age_of_a_picture_counts_from_the_time_at_which_it_was_last_improved() {
+fn age_counts_from_the_last_improvement() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     read(&mut ui);
@@ -291,15 +315,15 @@ fn the_age_of_a_picture_counts_from_the_time_at_which_it_was_last_improved() {
     ui.wait(8000);
     end(&mut ui, false, 8.0, 8.0);
     ui.wait(3000);
-    // Shown once more, such as in another size, it is as old as it was.
+    // Showing it again, for example at another size, does not change its age.
     shown(&mut ui, "bright", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
     shown(&mut ui, "dull", BLUE, false);
     ui.wait(2000);
     ui.press('n');
-    assert!(ui.text().contains("picture 1 of 2, 5 s ago"), "{}", ui.text());
-    // So is one whose render was stopped.
+    assert!(ui.text().contains(&format!("{}, 5 s ago", messages::render_of(1, 2))), "{}", ui.text());
+    // The same holds for a stopped render.
     ui.press('N');
     shown(&mut ui, "dull", GREEN, false);
     ui.wait(4000);
@@ -307,11 +331,15 @@ fn the_age_of_a_picture_counts_from_the_time_at_which_it_was_last_improved() {
     ui.wait(1000);
     ui.finish(RED);
     ui.press('n');
-    assert!(ui.text().contains("unfinished picture, 5 s ago"), "{}", ui.text());
+    assert!(
+        ui.text().contains(&format!("{}, 5 s ago", messages::unnumbered_render(messages::STOPPED))),
+        "{}",
+        ui.text()
+    );
 }
 
 #[test]
-fn settings_of_the_scene_again_stand_together() {
+fn reset_settings_are_listed_together() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('s');
@@ -322,12 +350,12 @@ fn settings_of_the_scene_again_stand_together() {
     ui.press('s');
     ui.finish(RED);
     ui.press('n');
-    let words = "after shadows and photons reset · n older · N newer";
-    assert!(!ui.text().contains("of the scene") && ui.text().contains(words), "{}", ui.text());
+    let words = format!("shadows and photons reset · {}", messages::HISTORY_KEYS.join(" · "));
+    assert!(ui.text().contains(&words), "{}", ui.text());
 }
 
 #[test]
-fn what_is_said_of_a_pinhole_is_true_with_and_without_its_key() {
+fn pinhole_is_reported_for_both_keys() {
     for text in ["[camera]\nfov = 40", "[camera]\naperture = 0.0"] {
         let mut ui = TestUi::new();
         save(&mut ui, text);
@@ -335,40 +363,40 @@ fn what_is_said_of_a_pinhole_is_true_with_and_without_its_key() {
         ui.state.request.effective = Some(Effective { dof: false, ..settings() });
         ui.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
         ui.press('d');
-        assert!(ui.text().contains("no depth of field: the camera's `aperture` is 0"), "{}", ui.text());
+        assert!(ui.text().contains(messages::PINHOLE), "{}", ui.text());
         ui.press('f');
-        assert!(ui.text().contains("everything is in focus: the camera's `aperture` is 0"), "{}", ui.text());
+        assert!(ui.text().contains(messages::PINHOLE), "{}", ui.text());
     }
 }
 
 #[test]
-fn a_scene_that_c_wrote_beside_a_model_stays() {
+fn new_model_scene_is_not_undone() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let (path, edit) = ("assets/knot.toml".into(), None);
     let kept = Kept { path, is_new: true, is_own: false, of_model: true, edit };
     ui.worker(protocol::Event::CameraKept { generation: 1, outcome: Ok(kept) });
     ui.press('u');
-    let words = "the scene that c wrote beside the model stays: there is nothing in it to undo";
+    let words = messages::NEW_SCENE_STAYS;
     assert!(ui.text().contains(words), "{}", ui.text());
 }
 
 #[test]
-fn nobody_is_asked_to_save_what_is_no_text() {
+fn unreadable_scenes_have_no_save_hint() {
     let mut ui = TestUi::new();
-    let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "this is a folder") };
+    let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "a folder") };
     ui.fail(vec![folder]);
     assert!(!ui.text().contains("save "), "{}", ui.text());
     ui.event(Event::Settled);
-    assert!(ui.text().contains("this is a folder") && !ui.text().contains("save "), "{}", ui.text());
+    assert!(ui.text().contains("a folder") && !ui.text().contains("save "), "{}", ui.text());
     let mut ui = TestUi::new();
     ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.event(Event::Settled);
-    assert!(ui.text().contains("save cornell.toml"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
 }
 
 #[test]
-fn the_end_is_never_no_time_away() {
+fn eta_is_never_zero() {
     for (seconds, words) in [(0.0, "ETA under 1 s"), (0.04, "ETA under 1 s"), (0.06, "ETA 0.1 s")] {
         let mut ui = TestUi::new();
         ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(seconds)) });
@@ -377,7 +405,7 @@ fn the_end_is_never_no_time_away() {
 }
 
 #[test]
-fn facts_of_the_folded_line_are_apart() {
+fn status_line_facts_are_separated() {
     let mut ui = TestUi::with(state(80, 24));
     ui.finish(RED);
     ui.press('l');
@@ -394,5 +422,9 @@ fn facts_of_the_folded_line_are_apart() {
     ui.state.display.frame = Some(FrameReport { bytes: 131_000, round_trip: None });
     ui.press('m');
     ui.state.overlays.message = None;
-    assert!(ui.text().contains("3 stages reused, not saved · w saves it"), "{}", ui.text());
+    assert!(
+        ui.text().contains(&format!("{}, {}", messages::cached("3 stages"), messages::NOT_SAVED)),
+        "{}",
+        ui.text()
+    );
 }

@@ -5,13 +5,14 @@ use std::time::Duration;
 use super::{BLUE, RED, cells_of};
 use crate::event::{Effect, Event, EventSource, KeyPress, Signal};
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol::{self, Command, Failure, PreviewSize, Writing};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::state::Activity;
 use crate::{Changed, ExitStatus};
 
 #[test]
-fn the_first_request_has_room_for_the_preview() {
+fn first_request_includes_the_preview_size() {
     let mut state = state(80, 24);
     let effects = crate::update::start(&mut state);
     let request = request(&effects).expect("a request");
@@ -20,7 +21,7 @@ fn the_first_request_has_room_for_the_preview() {
 }
 
 #[test]
-fn pictures_of_older_generations_are_dropped() {
+fn images_of_older_requests_are_dropped() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let old = ui.state.request.generation;
@@ -36,14 +37,14 @@ fn pictures_of_older_generations_are_dropped() {
     });
     ui.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     ui.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
-    assert!(!ui.state.dirty, "nothing is drawn for them");
+    assert!(!ui.state.dirty, "they change nothing");
     assert!(ui.state.work.progress.is_none() && ui.state.overlays.problems.is_none());
     assert_eq!(cells_of(&mut ui, BLUE), 0);
-    assert!(cells_of(&mut ui, RED) > 0, "the last picture stands until there is a newer one");
+    assert!(cells_of(&mut ui, RED) > 0, "the last image stays");
 }
 
 #[test]
-fn the_first_change_is_measured_from_the_save_to_the_frame() {
+fn first_change_is_measured_from_the_save() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let noticed = ui.now;
@@ -51,7 +52,7 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
     let effects = ui.event(Event::Changed(Changed { noticed }));
     assert_eq!(request(&effects).map(|it| it.generation), Some(2));
     ui.event(Event::Shown { generation: 1 });
-    assert_eq!(ui.state.saving.first_change, None, "the old picture does not count");
+    assert_eq!(ui.state.saving.first_change, None, "the old preview does not count");
     ui.event(Event::Picture {
         generation: 2,
         picture: plain_picture(50, 38, BLUE),
@@ -63,14 +64,14 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
     ui.now += Duration::from_millis(20);
     ui.event(Event::Shown { generation: 2 });
     ui.worker(done(2, Vec::new(), false));
-    assert!(ui.text().contains("saved → seen 23 ms"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::on_screen("23 ms")), "{}", ui.text());
     ui.now += Duration::from_millis(20);
     ui.event(Event::Shown { generation: 2 });
-    assert!(!ui.state.dirty && ui.text().contains("seen 23 ms"), "measured once");
+    assert!(!ui.state.dirty && ui.text().contains(&messages::on_screen("23 ms")), "measured once");
 }
 
 #[test]
-fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
+fn only_first_preview_is_urgent() {
     let mut ui = TestUi::new();
     let picture = |ui: &mut TestUi, generation| {
         ui.state.urgent = false;
@@ -87,13 +88,13 @@ fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
     assert!(picture(&mut ui, 1));
     assert!(!picture(&mut ui, 1));
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    assert!(!picture(&mut ui, 1), "an old one is no news");
+    assert!(!picture(&mut ui, 1), "an outdated preview");
     assert!(picture(&mut ui, 2));
     assert!(!picture(&mut ui, 2));
 }
 
 #[test]
-fn nothing_is_drawn_when_nothing_changed() {
+fn unchanged_state_is_not_redrawn() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.screen();
@@ -107,7 +108,7 @@ fn nothing_is_drawn_when_nothing_changed() {
 }
 
 #[test]
-fn the_clock_runs_while_rendering_and_stands_while_paused() {
+fn clock_stops_while_paused() {
     let mut ui = TestUi::new();
     ui.screen();
     assert!(ui.state.next_tick().is_some());
@@ -119,11 +120,11 @@ fn the_clock_runs_while_rendering_and_stands_while_paused() {
 }
 
 #[test]
-fn another_window_asks_for_another_preview_once_it_is_quiet() {
+fn preview_is_resized_after_a_quiet_time() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.event(Event::Resize(window(120, 40))).is_empty());
-    assert!(cells_of(&mut ui, RED) > 56 * 21, "the picture at hand is scaled meanwhile");
+    assert!(cells_of(&mut ui, RED) > 56 * 21, "the current image is scaled");
     ui.now += Duration::from_millis(50);
     ui.event(Event::Resize(window(200, 60)));
     assert!(ui.wait(50).is_empty());
@@ -140,14 +141,14 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
         lacks_photons: false,
         source: None,
     });
-    assert!(cells_of(&mut ui, BLUE) > 0, "the same request shows its picture again");
+    assert!(cells_of(&mut ui, BLUE) > 0, "the new preview is shown");
     ui.finish(RED);
     ui.event(Event::Resize(window(200, 60)));
-    assert!(ui.wait(1000).is_empty(), "the same size asks for nothing");
+    assert!(ui.wait(1000).is_empty(), "an unchanged size needs no request");
 }
 
 #[test]
-fn a_render_goes_on_in_another_window_held_or_not() {
+fn resize_does_not_restart_the_render() {
     for is_held in [false, true] {
         let mut ui = TestUi::new();
         ui.now += Duration::from_secs(5);
@@ -163,7 +164,7 @@ fn a_render_goes_on_in_another_window_held_or_not() {
 }
 
 #[test]
-fn a_comment_edited_renders_nothing_and_says_so() {
+fn comment_edit_reports_unchanged() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -174,7 +175,7 @@ fn a_comment_edited_renders_nothing_and_says_so() {
 }
 
 #[test]
-fn signals_end_stop_and_redraw() {
+fn signals_quit_suspend_or_redraw() {
     let mut ui = TestUi::new();
     let effect = |ui: &mut TestUi, signal| ui.event(Event::Signal(signal));
     assert!(matches!(effect(&mut ui, Signal::Interrupt)[..], [Effect::Quit(ExitStatus(130))]));
@@ -187,16 +188,16 @@ fn signals_end_stop_and_redraw() {
 }
 
 #[test]
-fn a_source_that_ends_is_dealt_with() {
+fn lost_event_sources_are_handled() {
     let mut ui = TestUi::new();
     assert!(matches!(ui.event(Event::Lost(EventSource::Worker))[..], [Effect::GiveUp]));
     assert!(matches!(ui.event(Event::Lost(EventSource::Keys))[..], [Effect::Quit(ExitStatus::HANGUP)]));
     assert!(ui.event(Event::Lost(EventSource::Watcher)).is_empty());
-    assert!(ui.text().contains("no longer watched"));
+    assert!(ui.text().contains(messages::NOT_WATCHING));
 }
 
 #[test]
-fn a_cancelled_render_says_that_it_stopped() {
+fn cancelled_render_is_reported() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Cancelled { generation: 1 });
     assert_eq!(ui.state.work.activity, Activity::Cancelled);
@@ -204,7 +205,7 @@ fn a_cancelled_render_says_that_it_stopped() {
 }
 
 #[test]
-fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
+fn unanswered_writes_are_known_at_exit() {
     let generation = 1;
     let written = |generation| protocol::Event::WriteDone { generation, paths: vec!["a.png".into()] };
     let failed = protocol::Event::WriteFailed { generation, path: None, message: "full".to_owned() };
@@ -224,7 +225,7 @@ fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
     let mut ui = TestUi::new();
     ui.press('w');
     ui.press('r');
-    assert!(ui.state.saving.is_write_requested, "the order goes over to the next request");
+    assert!(ui.state.saving.is_write_requested, "the next request writes it");
     ui.worker(written(ui.state.request.generation));
     assert!(!ui.state.saving.is_write_requested);
 }
@@ -234,25 +235,25 @@ fn wrong(message: &str) -> Vec<Diagnostic> {
 }
 
 #[test]
-fn a_file_that_is_half_there_is_no_error_until_it_stays_so() {
+fn errors_in_incomplete_files_are_held_back() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(wrong("half"));
     let text = ui.text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
-    assert!(text.contains("… waiting") && text.contains("for the file to be whole"), "{text}");
+    assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(wrong("three quarters"));
-    assert!(!ui.text().contains("three quarters") && !ui.text().contains("broken"));
+    ui.fail(wrong("more"));
+    assert!(!ui.text().contains("more") && !ui.text().contains("broken"));
     assert!(ui.event(Event::Settled).is_empty());
     let text = ui.text();
-    assert!(text.contains("error: three quarters") && text.contains("broken"), "{text}");
-    assert!(!text.contains("half"), "of what is in the file now: {text}");
+    assert!(text.contains("error: more") && text.contains("broken"), "{text}");
+    assert!(!text.contains("half"), "outdated error: {text}");
 }
 
 #[test]
-fn a_file_that_comes_in_two_pieces_shows_no_error() {
+fn file_written_in_pieces_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -267,21 +268,21 @@ fn a_file_that_comes_in_two_pieces_shows_no_error() {
 }
 
 #[test]
-fn an_error_in_a_file_that_stays_as_it_is_is_shown_at_once() {
+fn errors_in_stable_files_are_immediate() {
     let mut ui = TestUi::new();
-    ui.fail(wrong("from the start"));
-    assert!(ui.text().contains("error: from the start"), "nothing was saved");
+    ui.fail(wrong("first"));
+    assert!(ui.text().contains("error: first"), "no save");
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.event(Event::Settled);
-    ui.fail(wrong("that took long to be found"));
-    assert!(ui.text().contains("error: that took long to be found"));
+    ui.fail(wrong("late"));
+    assert!(ui.text().contains("error: late"));
     ui.press('r');
     ui.fail(wrong("again"));
     assert!(ui.text().contains("error: again"));
 }
 
 #[test]
-fn an_error_does_not_wait_for_a_watcher_that_is_gone() {
+fn errors_do_not_wait_for_a_lost_watcher() {
     let mut ui = TestUi::new();
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(wrong("half"));
@@ -293,7 +294,7 @@ fn an_error_does_not_wait_for_a_watcher_that_is_gone() {
 }
 
 #[test]
-fn a_failure_of_the_work_does_not_wait_for_the_file() {
+fn render_failures_are_immediate() {
     let mut ui = TestUi::new();
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let failure = Failure::Work("no memory".to_owned());
@@ -302,7 +303,7 @@ fn a_failure_of_the_work_does_not_wait_for_the_file() {
 }
 
 #[test]
-fn time_in_the_editor_is_not_from_the_save_to_the_screen() {
+fn time_in_the_editor_is_not_measured() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let noticed = ui.now;

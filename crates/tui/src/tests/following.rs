@@ -1,4 +1,4 @@
-//! Tests of the screen during a render, on a quick terminal and on a slow line, with simulated time.
+//! The screen during a render, on a fast terminal and over a slow connection, in simulated time.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -10,50 +10,50 @@ use super::super::display::{Display, TerminalLink};
 use super::super::graphics::{Images, PixelScreen, Protocol};
 use super::super::presenter::Presenter;
 use super::super::terminal_replies::TerminalReply;
-use crate::color::{ColorDepth, in_xterm};
+use crate::color::{ColorDepth, xterm_rgb};
 use crate::event::Event;
 use crate::film::Picture;
 use crate::fixtures::*;
-use crate::mosaic::filled;
+use crate::mosaic::filled_squares;
 use crate::pipeline::protocol::{self, LatestPreview, PreviewSlot};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Seconds of the render.
+/// Duration of the render in seconds.
 const SECONDS: f64 = 10.0;
 const SAMPLES: f64 = 256.0;
-/// Between two pictures of the worker, and between two of its words.
+/// Intervals between previews and between progress reports of the worker.
 const PICTURE: Duration = Duration::from_millis(66);
 const PROGRESS: Duration = Duration::from_millis(60);
 
-/// A line with a terminal at its end.
+/// Parameters of a simulated connection.
 #[derive(Clone, Copy)]
 struct SimulatedConnection {
     bytes_per_second: f64,
     round_trip: Duration,
 }
 
-const QUICK: SimulatedConnection =
+const FAST: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 2e7, round_trip: Duration::from_millis(1) };
 /// 1 Mbit/s.
-const THIN: SimulatedConnection =
+const SLOW: SimulatedConnection =
     SimulatedConnection { bytes_per_second: 125e3, round_trip: Duration::from_millis(150) };
 
-/// The terminal: what is on its screen, and its answers under way.
+/// A terminal with its screen and its replies in flight.
 struct SimulatedTerminal {
     line: SimulatedConnection,
-    /// When the last byte leaves the line.
+    /// Time at which the connection is idle.
     free: Instant,
     arriving: VecDeque<(Instant, Vec<u8>)>,
     answers: VecDeque<(Instant, TerminalReply)>,
     cells: vt100::Parser,
     pixels: PixelScreen,
-    /// Bytes that came, and their number.
+    /// Received bytes, and their number.
     bytes: Vec<u8>,
     sent: usize,
-    /// Bytes in the line or unanswered, and the most of them.
+    /// Bytes in flight or unacknowledged, and their maximum.
     unanswered: VecDeque<(Instant, usize)>,
     most_unanswered: usize,
 }
@@ -75,7 +75,7 @@ impl SimulatedTerminal {
         }
     }
 
-    /// A slice goes into the line. Each of them ends with a question.
+    /// Sends a slice, which ends with a query.
     fn send(&mut self, bytes: Vec<u8>, now: Instant) {
         let SimulatedConnection { bytes_per_second, round_trip } = self.line;
         let answer =
@@ -89,7 +89,7 @@ impl SimulatedTerminal {
         self.arriving.push_back((self.free + round_trip / 2, bytes));
     }
 
-    /// Shows what has arrived.
+    /// Shows the bytes that have arrived.
     fn pass(&mut self, now: Instant) {
         while let Some((_, bytes)) = self.arriving.pop_front_if(|(when, _)| *when <= now) {
             self.cells.process(&bytes);
@@ -104,7 +104,7 @@ impl SimulatedTerminal {
         arriving.into_iter().chain(self.answers.front().map(|(when, _)| *when)).min()
     }
 
-    /// The colors of the parts of all cells, or of the pixels.
+    /// The colors of all parts of cells, or of the pixels.
     fn seen(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
@@ -120,21 +120,21 @@ impl SimulatedTerminal {
     }
 }
 
-/// The colors of the parts of a cell of blocks; `None`: it has other characters, or the terminal's own colors.
+/// The colors of the parts of a block character. `None` for other characters and default colors.
 fn parts(cell: &vt100::Cell) -> Option<[[u8; 3]; 24]> {
     let color = |color| match color {
         vt100::Color::Default => None,
-        vt100::Color::Idx(index) => in_xterm(ratatui::style::Color::Indexed(index)),
+        vt100::Color::Idx(index) => xterm_rgb(ratatui::style::Color::Indexed(index)),
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),
     };
-    let filled = filled(cell.contents().chars().next().unwrap_or(' '))?;
+    let filled_squares = filled_squares(cell.contents().chars().next().unwrap_or(' '))?;
     let (fg, bg) = (color(cell.fgcolor()), color(cell.bgcolor()));
     let part = |is_ink: bool| if is_ink { fg } else { bg };
-    let parts = filled.map(part);
+    let parts = filled_squares.map(part);
     parts.iter().all(Option::is_some).then(|| parts.map(Option::unwrap_or_default))
 }
 
-/// A render that somebody watches.
+/// A render shown on a simulated terminal.
 struct WatchedRender {
     ui: TestUi,
     presenter: Presenter,
@@ -143,11 +143,11 @@ struct WatchedRender {
     slot: PreviewSlot,
     begin: Instant,
     size: (u32, u32),
-    /// When the worker says how far it is, and has a picture.
+    /// Times of the next progress report and preview.
     next: [Instant; 2],
-    /// Pictures that were drawn.
+    /// Number of previews drawn.
     shown: usize,
-    /// Steps of the camera.
+    /// Number of camera steps.
     turn: u32,
 }
 
@@ -165,7 +165,7 @@ impl WatchedRender {
             exposure: 0.0,
             own: own(),
         });
-        let size = ui.state.request.preview_size.expect("previews are asked for");
+        let size = ui.state.request.preview_size.expect("a preview size");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {
             PreviewKind::Pixels(protocol) => Some(Images::new(protocol, false)),
@@ -188,23 +188,23 @@ impl WatchedRender {
         }
     }
 
-    /// Goes on until so much of the render is done.
+    /// Runs until this fraction of the render is done.
     fn until(&mut self, fraction: f64) {
         let end = self.begin + Duration::from_secs_f64(SECONDS * fraction);
-        self.go_on(end, true);
+        self.advance(end, true);
     }
 
-    /// Holds a key on the camera for so long: the worker has a first picture of each step soon after its request.
+    /// Holds a camera key for this time. The worker has a first preview of each step soon after its request.
     fn orbit(&mut self, time: Duration) {
         const REPEAT: Duration = Duration::from_millis(33);
         const FIRST: Duration = Duration::from_millis(12);
         let end = self.ui.now + time;
         let (mut key, mut last) = (self.ui.now, self.ui.state.request.generation);
-        // The last step of a key that was held before may have no picture yet.
+        // The last step of a previous key may have no preview yet.
         let mut asked = Some(self.ui.now);
         while self.ui.now < end {
             let next = asked.map_or(key, |asked: Instant| key.min(asked + FIRST));
-            self.go_on(next, false);
+            self.advance(next, false);
             if asked.is_some_and(|asked| self.ui.now >= asked + FIRST) {
                 asked = None;
                 self.turn += 1;
@@ -214,22 +214,22 @@ impl WatchedRender {
                 key += REPEAT;
                 self.ui.press('l');
             }
-            // A step that waited is requested when the step before has its picture.
+            // A waiting step is requested when the previous one has a preview.
             if self.ui.state.request.generation > last {
                 (asked, last) = (Some(self.ui.now), self.ui.state.request.generation);
             }
         }
     }
 
-    /// The last picture, until all of it has arrived.
+    /// Shows the final preview completely.
     fn finish(&mut self) {
         let generation = self.ui.state.request.generation;
         self.put_picture(SAMPLES);
         self.ui.worker(done(generation, Vec::new(), false));
-        self.go_on(self.ui.now + Duration::from_secs(5), false);
+        self.advance(self.ui.now + Duration::from_secs(5), false);
     }
 
-    fn go_on(&mut self, end: Instant, is_at_work: bool) {
+    fn advance(&mut self, end: Instant, is_at_work: bool) {
         loop {
             let now = self.ui.now;
             self.presenter.draw_if_due(&mut self.ui.state, now);
@@ -253,7 +253,7 @@ impl WatchedRender {
         }
     }
 
-    /// Events by now.
+    /// Handles all events that are due.
     fn events(&mut self, is_at_work: bool) {
         let now = self.ui.now;
         self.terminal.pass(now);
@@ -302,9 +302,9 @@ impl WatchedRender {
     }
 }
 
-/// A room of soft colors, seen from a place, with the noise of so many samples.
+/// A room in soft colors with the noise of this many samples.
 fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
-    /// Codes, of one sample: about that of a Cornell box.
+    /// Noise of one sample in codes, similar to a Cornell box.
     const NOISE: f64 = 1.2;
     let pixel = |i: u32| {
         let column = (i % width + 3 * turn) % width;
@@ -313,7 +313,7 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
         let hash = (u64::from(i) << 20 ^ samples.to_bits()).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         let channel = |c: usize| {
             let unit = f64::from((hash >> (16 * c) & 0xFFFF) as u16) / 65536.0 - 0.5;
-            // Of a mean distance of a quarter of the width.
+            // The mean absolute deviation is a quarter of the width.
             wall[c] * (0.4 + 0.6 * y) + NOISE * 4.0 * unit / samples.sqrt()
         };
         std::array::from_fn(|c| channel(c).round() as u8)
@@ -321,28 +321,29 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
     Picture { width, height, pixels: (0..width * height).map(pixel).collect() }
 }
 
-/// The mean distance of two screens, in codes of 255.
+/// Mean difference of two screens in codes of 255.
 fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
     assert!(!b.is_empty() && a.len() == b.len(), "{} and {} parts", a.len(), b.len());
     let all = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(a.abs_diff(*b)));
     all.sum::<f64>() / (3 * a.len()) as f64
 }
 
-/// Codes that the screen may be off the final one at 10, 25 and 50 % of a render.
-const MOST: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
+/// Maximum difference from the final screen, in codes, at 10, 25 and 50 % of a render.
+const MAX: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
 
-/// Checks that the screen is near the final one at each fraction of [`MOST`], and that there are enough pictures.
+/// Checks that the screen is close to the final one at each fraction of [`MAX`], and that there are enough
+/// previews.
 #[track_caller]
 fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
-    let mut watch = WatchedRender::new(QUICK, preview, depth);
-    let screens = MOST.map(|(fraction, _)| {
+    let mut watch = WatchedRender::new(FAST, preview, depth);
+    let screens = MAX.map(|(fraction, _)| {
         watch.until(fraction);
         watch.terminal.seen()
     });
     watch.until(1.0);
     let pictures = watch.shown;
     watch.finish();
-    for ((fraction, most), screen) in MOST.into_iter().zip(&screens) {
+    for ((fraction, most), screen) in MAX.into_iter().zip(&screens) {
         let apart = apart(screen, &watch.terminal.seen());
         assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: {apart} codes");
     }
@@ -350,28 +351,28 @@ fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
 }
 
 #[test]
-fn a_quick_terminal_follows_the_render_in_half_blocks() {
+fn fast_terminal_follows_in_half_blocks() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::TrueColor);
 }
 
 #[test]
-fn a_quick_terminal_follows_the_render_in_sextants() {
+fn fast_terminal_follows_in_sextants() {
     assert_followed(PreviewKind::Sextant, ColorDepth::TrueColor);
 }
 
 #[test]
-fn a_quick_terminal_follows_the_render_in_256_colors() {
+fn fast_terminal_follows_in_256_colors() {
     assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
 }
 
 #[test]
-fn a_quick_terminal_follows_the_render_in_pixels() {
+fn fast_terminal_follows_in_pixels() {
     assert_followed(PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor);
 }
 
 #[test]
-fn a_thin_line_carries_few_pictures_and_no_queue_of_them() {
-    let mut watch = WatchedRender::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+fn slow_connection_gets_few_previews() {
+    let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(1.0);
     assert!(watch.shown <= 12, "{} pictures in 10 s", watch.shown);
     let sent = watch.terminal.sent;
@@ -380,35 +381,35 @@ fn a_thin_line_carries_few_pictures_and_no_queue_of_them() {
     let before = watch.terminal.seen();
     watch.finish();
     let apart = apart(&before, &watch.terminal.seen());
-    assert!(apart > 0.5 && apart < 4.0, "{apart} codes: the last picture is exact, those before need not be");
+    assert!(apart > 0.5 && apart < 4.0, "{apart} codes: only the last preview is exact");
 }
 
 #[test]
-fn a_held_key_fills_a_thin_line() {
-    let mut watch = WatchedRender::new(THIN, PreviewKind::HalfBlock, ColorDepth::TrueColor);
+fn held_key_fills_a_slow_connection() {
+    let mut watch = WatchedRender::new(SLOW, PreviewKind::HalfBlock, ColorDepth::TrueColor);
     watch.until(0.2);
     watch.orbit(Duration::from_secs(2));
     let before = watch.terminal.sent;
     watch.orbit(Duration::from_secs(6));
-    let used = (watch.terminal.sent - before) as f64 / (6.0 * THIN.bytes_per_second);
+    let used = (watch.terminal.sent - before) as f64 / (6.0 * SLOW.bytes_per_second);
     assert!(used >= 0.7, "{used} of the line");
     assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
 }
 
-/// kitty 0.26 shows nothing of pictures whose chunks come between the marks of synchronised output.
+/// kitty 0.26 shows no images whose chunks are sent as synchronized output.
 #[test]
-fn only_cells_are_sent_between_marks() {
+fn only_cells_are_synchronized_output() {
     let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");
     for (preview, is_marked) in
         [(PreviewKind::HalfBlock, true), (PreviewKind::Pixels(Protocol::Kitty), false)]
     {
-        let mut watch = WatchedRender::new(QUICK, preview, ColorDepth::TrueColor);
+        let mut watch = WatchedRender::new(FAST, preview, ColorDepth::TrueColor);
         watch.presenter.display.answered(TerminalReply::Synchronized { is_known: true }, watch.begin);
         watch.until(0.1);
         let sent = String::from_utf8_lossy(&watch.terminal.bytes).into_owned();
         let between: Vec<&str> =
             sent.split(begin).skip(1).filter_map(|rest| rest.split(end).next()).collect();
-        assert!(!is_marked || !between.is_empty(), "large slices of cells have marks");
+        assert!(!is_marked || !between.is_empty(), "large slices of cells are synchronized");
         assert!(between.iter().all(|part| !part.contains("\x1b_G")), "{preview:?}");
         assert_eq!(sent.contains("\x1b_G"), !is_marked, "{preview:?}");
     }

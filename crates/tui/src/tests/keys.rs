@@ -1,4 +1,4 @@
-//! Tests of the effect of each key, and that the help tells it.
+//! The effect of each key, and its description in the help.
 
 use super::{BLUE, RED, cells_of};
 use crate::action::Action;
@@ -6,8 +6,9 @@ use crate::choice::Choice;
 use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress};
 use crate::fixtures::*;
-use crate::keymap::KEYMAP;
+use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
+use crate::messages;
 use crate::pipeline::protocol::{self, CameraEdit, Command, Spot, Writing};
 use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
 use crate::preview_kind::PreviewKind;
@@ -15,7 +16,7 @@ use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
 use crate::{Changed, ExitStatus};
 
-/// Every key of the table does what its line says. The match has an arm for every action.
+/// Every key has the effect that its row describes. The match has an arm for every action.
 #[test]
 fn every_key_has_its_effect() {
     for binding in KEYMAP {
@@ -27,7 +28,7 @@ fn every_key_has_its_effect() {
     }
 }
 
-/// The pose that a key gives to the camera.
+/// The camera pose that a key requests.
 fn moved(effects: &[Effect]) -> Pose {
     request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
@@ -36,7 +37,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
     let overrides = |effects: &[Effect]| request(effects).map(|it| it.overrides.clone());
     match action {
         Action::CycleShadows => {
-            // Back at the scene's own value, nothing is overridden.
+            // The scene's own value is not an override.
             for (wanted, by_key) in [
                 (Shadows::Hard, Some(Shadows::Hard)),
                 (Shadows::Off, Some(Shadows::Off)),
@@ -60,8 +61,8 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 assert_eq!(ui.state.request.photons(), wanted);
             }
             ui.press('i');
-            assert!(ui.key(key).is_empty(), "path has none");
-            assert!(ui.text().contains("path gathers no photons; press i for whitted"), "{}", ui.text());
+            assert!(ui.key(key).is_empty(), "path has no photons");
+            assert!(ui.text().contains(&messages::no_photons("whitted")), "{}", ui.text());
         }
         Action::CycleIntegrator => {
             for (wanted, by_key) in [(Integrator::Path, Some(Integrator::Path)), (Integrator::Whitted, None)]
@@ -72,15 +73,15 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             }
             ui.key(key);
             assert!(ui.text().contains("path"), "{}", ui.text());
-            assert!(ui.press('s').is_empty(), "path has no other shadows");
-            assert!(ui.text().contains("path ignores"), "{}", ui.text());
+            assert!(ui.press('s').is_empty(), "path always has soft shadows");
+            assert!(ui.text().contains(&messages::soft_shadows("path", "whitted")), "{}", ui.text());
         }
         Action::NextView | Action::PreviousView => {
             let effects = ui.key(key);
             let wanted = if action == Action::NextView { View::Normal } else { View::Error };
             let request = request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
-            assert!(ui.text().contains(&format!("view {} (preview only)", wanted.name())));
+            assert!(ui.text().contains(&messages::view(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
             let moved = moved(&ui.key(key)).position - DVec3::Y;
@@ -110,13 +111,13 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 Some((Some(stops), Writing::No))
             );
             assert!(
-                ui.text().contains(&format!("exposure {}", crate::state::signed_stops(stops))),
+                ui.text().contains(&messages::exposure(&crate::state::signed_stops(stops))),
                 "{}",
                 ui.text()
             );
         }
         Action::KeepCamera => {
-            assert!(ui.key(key).is_empty(), "it has not moved");
+            assert!(ui.key(key).is_empty(), "unchanged");
             ui.press('l');
             let wanted = ui.state.request.viewpoint().expect("a camera");
             assert!(
@@ -129,27 +130,23 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             );
         }
         Action::UndoCamera => {
-            assert!(ui.key(key).is_empty(), "c has written nothing");
+            assert!(ui.key(key).is_empty(), "no kept camera");
             let edit = CameraEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
             ui.state.saving.camera_edits.push(edit.clone());
             assert!(matches!(&ui.key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit));
         }
         Action::Copy => {
-            assert!(ui.key(key).is_empty(), "nothing was clicked");
+            assert!(ui.key(key).is_empty(), "no click yet");
             ui.state.selection.clicked = Some("a ball".to_owned());
-            assert!(
-                ui.key(key).is_empty() && ui.text().contains("to copy, drag with shift"),
-                "{}",
-                ui.text()
-            );
+            assert!(ui.key(key).is_empty() && ui.text().contains(messages::SELECT_TO_COPY), "{}", ui.text());
             ui.state.display.capabilities.clipboard = true;
             assert!(matches!(ui.key(key)[..], [Effect::Aside(_)]));
         }
         Action::Focus => {
-            assert!(ui.key(key).is_empty(), "a click is waited for");
+            assert!(ui.key(key).is_empty(), "waits for a click");
             assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Pick(_))]));
         }
-        Action::CloseUp => {
+        Action::ActualPixels => {
             let around = |effects: &[Effect]| match effects {
                 [Effect::Send(Command::Preview(Some(size)))] => size.around,
                 other => panic!("{other:?}"),
@@ -158,13 +155,13 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(ui.text().contains("x back"), "{}", ui.text());
             assert_eq!(around(&ui.key(key)), None);
         }
-        Action::RectangleFirst => {
+        Action::RenderRegionFirst => {
             let first = |effects: &[Effect]| request(effects).expect("a request").first;
             ui.press('r');
-            assert!(ui.key(key).is_empty(), "a drag is waited for");
+            assert!(ui.key(key).is_empty(), "waits for a drag");
             let section = first(&ui.key(key)).expect("around the crosshair");
             assert!((section.left - 1.0 / 3.0).abs() < 1e-9 && (section.height - 1.0 / 3.0).abs() < 1e-9);
-            assert!(ui.text().contains("z rectangle first"), "{}", ui.text());
+            assert!(ui.text().contains("z region first"), "{}", ui.text());
             assert_eq!(first(&ui.key(key)), None);
         }
         Action::ToggleMouse => {
@@ -172,7 +169,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(matches!(ui.key(key)[..], [Effect::Mouse(true)]));
         }
         Action::Edit => assert!(matches!(ui.key(key)[..], [Effect::Edit(_)])),
-        Action::BeforeAfter => {
+        Action::CompareLastEdit => {
             ui.event(Event::Changed(Changed { noticed: ui.now }));
             ui.finish(BLUE);
             for (color, other) in [(RED, BLUE), (BLUE, RED)] {
@@ -180,10 +177,10 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 assert!(cells_of(ui, color) > 0 && cells_of(ui, other) == 0);
             }
         }
-        Action::OlderPicture | Action::NewerPicture => {
+        Action::OlderRender | Action::NewerRender => {
             ui.press('s');
             ui.finish(BLUE);
-            let is_older = action == Action::OlderPicture;
+            let is_older = action == Action::OlderRender;
             if !is_older {
                 ui.press('n');
             }
@@ -197,19 +194,19 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Pause(false))]));
         }
         Action::RenderAgain => assert!(request(&ui.key(key)).expect("a request").force),
-        Action::WriteNow => assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Write)])),
-        Action::SceneSettings => {
+        Action::WriteImage => assert!(matches!(ui.key(key)[..], [Effect::Send(Command::Write)])),
+        Action::ResetSettings => {
             ui.press('s');
             ui.press('v');
             assert_eq!(overrides(&ui.key(key)), Some(Overrides::default()));
-            assert!(ui.key(key).is_empty(), "there is nothing left to undo");
+            assert!(ui.key(key).is_empty(), "nothing left to reset");
         }
         Action::ToggleDiagnostics => {
             ui.fail(vec![diagnostic(Severity::Error, "wrong")]);
             assert!(ui.key(key).is_empty());
             assert!(!ui.text().contains("error: wrong"));
         }
-        Action::PictureAlone => {
+        Action::ShowImageOnly => {
             let cells = cells_of(ui, RED);
             let effects = ui.key(key);
             assert!(matches!(effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
@@ -218,10 +215,11 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert_eq!(cells_of(ui, RED), cells);
         }
         Action::ToggleHelp => {
+            let help = keymap::of(action).expect("a binding").help;
             ui.key(key);
-            assert!(ui.text().contains("show or hide this help"));
+            assert!(ui.text().contains(help));
             ui.key(key);
-            assert!(!ui.text().contains("show or hide this help"));
+            assert!(!ui.text().contains(help));
         }
         Action::Redraw => assert!(matches!(ui.key(key)[..], [Effect::Redraw])),
         Action::Suspend => assert!(matches!(ui.key(key)[..], [Effect::StopJob])),
@@ -236,7 +234,7 @@ fn bottom(ui: &mut TestUi) -> String {
 }
 
 #[test]
-fn toggles_stand_in_the_line_of_keys_with_their_values() {
+fn key_line_shows_toggles_and_values() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(bottom(&mut ui).starts_with("s soft  p off  d on  v beauty  i whitted  "), "{}", bottom(&mut ui));
@@ -245,7 +243,7 @@ fn toggles_stand_in_the_line_of_keys_with_their_values() {
     assert!(!is_bold(&mut ui));
     ui.press('s');
     assert!(bottom(&mut ui).starts_with("s hard"), "{}", bottom(&mut ui));
-    assert!(is_bold(&mut ui), "changed by a key");
+    assert!(is_bold(&mut ui), "bold after a change");
     ui.press('i');
     assert!(bottom(&mut ui).starts_with("s –  p off  d on  v beauty  i path"), "{}", bottom(&mut ui));
     ui.event(Event::Resize(window(140, 40)));
@@ -262,13 +260,13 @@ fn toggles_stand_in_the_line_of_keys_with_their_values() {
 }
 
 #[test]
-fn what_is_of_use_now_stands_beside_the_toggles() {
+fn key_line_shows_what_is_useful_now() {
     let mut ui = TestUi::new();
     assert!(bottom(&mut ui).contains("space pause"), "{}", bottom(&mut ui));
     ui.press(' ');
-    assert!(bottom(&mut ui).contains("space go on"), "{}", bottom(&mut ui));
+    assert!(bottom(&mut ui).contains("space resume"), "{}", bottom(&mut ui));
     ui.finish(RED);
-    assert!(bottom(&mut ui).contains("tab picture") && !bottom(&mut ui).contains("space"));
+    assert!(bottom(&mut ui).contains("tab image") && !bottom(&mut ui).contains("space"));
     ui.press('s');
     ui.finish(RED);
     ui.event(Event::Resize(window(200, 60)));
@@ -286,27 +284,27 @@ fn what_is_of_use_now_stands_beside_the_toggles() {
 }
 
 #[test]
-fn a_message_stands_under_the_picture_until_the_next_key_and_the_keys_stay() {
+fn message_is_shown_until_the_next_key() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let hints = bottom(&mut ui);
     ui.press('0');
     let text = ui.text();
-    assert!(text.lines().nth(22).is_some_and(|line| line.starts_with("nothing to reset")), "{text}");
+    assert!(text.lines().nth(22).is_some_and(|line| line.starts_with(messages::NOTHING_TO_RESET)), "{text}");
     assert_eq!(bottom(&mut ui), hints);
     ui.press('?');
     ui.press('?');
-    assert!(!ui.text().contains("nothing to reset"));
-    // Without a line of its own it takes the place of the keys, and without those the place of the name.
+    assert!(!ui.text().contains(messages::NOTHING_TO_RESET));
+    // Without its own line, it replaces the keys, or the name in the header.
     for rows in [12, 5] {
         ui.event(Event::Resize(window(60, rows)));
         ui.press('0');
-        assert!(ui.text().contains("nothing to reset"), "{}", ui.text());
+        assert!(ui.text().contains(messages::NOTHING_TO_RESET), "{}", ui.text());
     }
 }
 
 #[test]
-fn toggles_start_from_the_command_line_and_go_back_to_it() {
+fn toggles_start_from_the_command_line() {
     let base = Overrides { shadows: Some(Shadows::Off), view: Some(View::Depth), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone());
     let mut ui = TestUi::with(state);
@@ -314,7 +312,7 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
     let effects = ui.press('s');
     let soft = request(&effects).expect("a request");
     assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::No));
-    assert_eq!(soft.own.as_deref(), Some(&base), "the image of the call is kept");
+    assert_eq!(soft.own.as_deref(), Some(&base), "the own image continues");
     let effects = ui.press('V');
     assert_eq!(request(&effects).expect("a request").write, Writing::No);
     let effects = ui.press('0');
@@ -322,7 +320,7 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
 }
 
 #[test]
-fn depth_of_field_of_a_pinhole_is_explained() {
+fn pinhole_has_no_depth_of_field() {
     let mut ui = TestUi::new();
     let pinhole = || Box::new(Effective { dof: false, ..settings() });
     ui.worker(protocol::Event::Settings {
@@ -333,7 +331,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         own: own(),
     });
     assert!(ui.press('d').is_empty());
-    assert!(ui.text().contains("the camera's `aperture` is 0"));
+    assert!(ui.text().contains(messages::PINHOLE));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
@@ -353,41 +351,43 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         exposure: 0.0,
         own: own(),
     });
-    assert!(ui.text().contains("the camera's `aperture` is 0"));
+    assert!(ui.text().contains(messages::PINHOLE));
 }
 
 #[test]
-fn a_new_request_lets_a_paused_worker_go_on() {
+fn new_request_ends_a_pause() {
     let mut ui = TestUi::new();
     ui.press(' ');
     let effects = ui.event(Event::Changed(Changed { noticed: ui.now }));
     assert!(matches!(effects[..], [Effect::Send(Command::Pause(false)), Effect::Send(Command::Render(_))]));
     assert!(!ui.state.work.paused);
-    assert!(ui.text().contains("no longer paused"), "{}", ui.text());
+    assert!(ui.text().contains(messages::RESUMED), "{}", ui.text());
 }
 
 #[test]
-fn a_key_that_ends_a_pause_says_so_beside_what_it_says_itself() {
-    for (key, words) in
-        [('s', "no longer paused"), ('r', "no longer paused"), ('v', "view normal (preview only)")]
-    {
+fn resuming_is_reported_with_other_messages() {
+    for (key, words) in [
+        ('s', messages::RESUMED.to_owned()),
+        ('r', messages::RESUMED.to_owned()),
+        ('v', messages::view("normal")),
+    ] {
         let mut ui = TestUi::new();
         ui.press(' ');
         let effects = ui.press(key);
         assert!(request(&effects).is_some() && !ui.state.work.paused);
         let text = ui.text();
-        assert!(text.contains("no longer paused") && text.contains(words), "{key}: {text}");
+        assert!(text.contains(messages::RESUMED) && text.contains(&words[..5]), "{key}: {text}");
         ui.press(key);
-        assert!(!ui.text().contains("no longer paused"), "{key}: said once");
+        assert!(!ui.text().contains(messages::RESUMED), "{key}: said once");
     }
     let mut ui = TestUi::new();
     ui.press(' ');
     ui.press(' ');
-    assert!(!ui.text().contains("no longer paused"), "whoever ends it by its key knows");
+    assert!(!ui.text().contains(messages::RESUMED), "space needs no message");
 }
 
 #[test]
-fn the_clock_stands_still_while_a_render_is_held() {
+fn clock_stops_while_paused() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
     ui.wait(3000);
@@ -401,25 +401,25 @@ fn the_clock_stands_still_while_a_render_is_held() {
 }
 
 #[test]
-fn pausing_nothing_is_explained() {
+fn pause_without_a_render_is_explained() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.press(' ').is_empty());
-    assert!(ui.text().contains("nothing is rendering"));
+    assert!(ui.text().contains(messages::NOT_RENDERING));
 }
 
 #[test]
-fn a_picture_that_is_written_later_says_so_and_then_that_it_is() {
+fn postponed_write_is_reported_twice() {
     let mut ui = TestUi::new();
     ui.press('w');
     ui.worker(protocol::Event::WritePostponed { generation: 1 });
-    assert!(ui.text().contains("as soon as every pixel has a sample"), "{}", ui.text());
+    assert!(ui.text().contains(messages::WRITE_POSTPONED), "{}", ui.text());
     ui.worker(protocol::Event::WriteDone { generation: 1, paths: vec!["cornell.png".into()] });
-    assert!(ui.text().contains("wrote cornell.png"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::wrote("cornell.png")), "{}", ui.text());
 }
 
 #[test]
-fn a_render_that_is_stopped_is_no_longer_held() {
+fn cancelled_render_is_not_paused() {
     let mut ui = TestUi::new();
     ui.press(' ');
     ui.worker(protocol::Event::Cancelled { generation: 1 });
@@ -427,7 +427,7 @@ fn a_render_that_is_stopped_is_no_longer_held() {
 }
 
 #[test]
-fn a_toggle_that_is_back_where_the_scene_has_it_is_no_change() {
+fn reverted_toggle_is_no_change() {
     for (keys, base) in [
         ("sss", Overrides::default()),
         ("sss", Overrides { shadows: Some(Shadows::Hard), ..Overrides::default() }),
@@ -445,7 +445,7 @@ fn a_toggle_that_is_back_where_the_scene_has_it_is_no_change() {
             requests.extend(request(&ui.press(key)).cloned());
         }
         assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");
-        // It goes on from there, whether its answer has come or not.
+        // Toggling starts again, whether the reply has arrived or not.
         let first = request(&ui.press(keys.chars().next().expect("a key"))).cloned().expect("a request");
         assert_eq!(first.overrides, requests[0].overrides, "{keys}");
     }
@@ -453,16 +453,16 @@ fn a_toggle_that_is_back_where_the_scene_has_it_is_no_change() {
     ui.finish(RED);
     "sssii".chars().for_each(|key| drop(ui.press(key)));
     assert!(ui.press('0').is_empty());
-    assert!(ui.text().contains("nothing to reset"), "{}", ui.text());
+    assert!(ui.text().contains(messages::NOTHING_TO_RESET), "{}", ui.text());
 }
 
 #[test]
-fn the_scene_has_other_settings_after_a_save() {
+fn save_changes_the_base_of_toggles() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('s');
     ui.finish(BLUE);
-    // The save is of `hard`, which the keys have as well.
+    // The save sets hard shadows, as the keys do.
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let (generation, own) = (ui.state.request.generation, OwnSettings { shadows: Shadows::Hard, ..own() });
     let settings = Box::new(Effective { shadows: Shadows::Hard, ..settings() });

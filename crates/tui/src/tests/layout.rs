@@ -1,4 +1,4 @@
-//! Tests of the layout: the picture's part of the screen, and that nothing jumps.
+//! The layout: room for the image, and nothing that jumps.
 
 use super::{RED, cells_of};
 use crate::Changed;
@@ -6,6 +6,7 @@ use crate::color::ColorDepth;
 use crate::event::{Effect, Event};
 use crate::fixtures::*;
 use crate::graphics::Protocol;
+use crate::messages;
 use crate::pipeline::protocol::{self, Command, PreviewSize, Stage, Status};
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::preview_kind::PreviewKind;
@@ -15,14 +16,14 @@ use crate::view::layout::Layout;
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const SIZES: [(u32, u32); 4] = [(640, 480), (1280, 720), (640, 400), (512, 512)];
 
-/// A picture of this size as the worker shows it, at most as large as asked for.
+/// The preview of an image of this size, within the requested size.
 fn previewed(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
     let scale = (f64::from(most.width) / f64::from(size.0)).min(f64::from(most.height) / f64::from(size.1));
     let side = |length: u32, most: u32| ((f64::from(length) * scale).round() as u32).clamp(1, most);
     (side(size.0, most.width), side(size.1, most.height))
 }
 
-/// The settings of a scene of this size, and its picture at the requested size.
+/// Reports the settings of a scene of this size and shows its preview.
 fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -51,7 +52,7 @@ fn show(ui: &mut TestUi, size: (u32, u32)) {
     });
 }
 
-/// Cells of the largest picture that a window could hold beside one line of words.
+/// Cells of the largest image that fits in a window with one line of text.
 fn most_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
     let shape = f64::from(width) / f64::from(height) * 2.0;
     let room = (f64::from(columns), f64::from(rows - 1));
@@ -60,7 +61,7 @@ fn most_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
 }
 
 #[test]
-fn the_picture_gets_the_space() {
+fn image_gets_most_of_the_space() {
     for window in WINDOWS {
         for size in SIZES {
             let most = most_cells(window, size);
@@ -78,7 +79,7 @@ fn the_picture_gets_the_space() {
 }
 
 #[test]
-fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
+fn nothing_jumps_during_a_render() {
     for (columns, rows) in WINDOWS.into_iter().chain([(40, 12), (30, 8), (80, 60)]) {
         let mut ui = TestUi::with(state(columns, rows));
         rendered(&mut ui, (640, 480));
@@ -119,7 +120,7 @@ fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
 }
 
 #[test]
-fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
+fn new_shape_gets_a_preview_of_its_size() {
     let mut ui = TestUi::new();
     let settings = |width| Box::new(Effective { width, height: 480, ..settings() });
     let same = ui.worker(protocol::Event::Settings {
@@ -152,19 +153,19 @@ fn small_windows_are_usable() {
         assert!(text.contains("● rendering") && text.contains("50 %"), "{text}");
         assert!(text.contains("? help") && text.contains("s soft"), "{text}");
         ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(4567.0)) });
-        assert!(ui.text().contains("50 %"), "how far it is before how long: {}", ui.text());
+        assert!(ui.text().contains("50 %"), "progress takes precedence over ETA: {}", ui.text());
         rendered(&mut ui, (640, 480));
         let share = cells_of(&mut ui, RED) as f64 / most_cells((columns, rows), (640, 480));
         assert!(share >= 0.7, "{share:.3}\n{}", ui.text());
-        ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
         let text = ui.text();
-        assert!(text.contains("✗ broken") && text.contains("error: unknown key `heigth`"), "{text}");
-        assert!(text.contains("scenes/cornell.toml:3:1"), "{text}");
+        assert!(text.contains("✗ broken") && text.contains("error: misspelled"), "{text}");
+        assert!(text.contains("cornell.toml:3:1"), "{text}");
     }
 }
 
 #[test]
-fn the_line_under_the_picture_tells_how_far_it_is_and_then_what_it_took() {
+fn status_line_shows_progress_then_results() {
     let mut ui = TestUi::with(state(120, 40));
     let under = |ui: &mut TestUi| ui.text().lines().nth(38).map(str::to_owned).unwrap_or_default();
     let of = |name, status, seconds| protocol::Event::Stage {
@@ -180,11 +181,11 @@ fn the_line_under_the_picture_tells_how_far_it_is_and_then_what_it_took() {
     assert!(under(&mut ui).starts_with("render ━"), "{}", under(&mut ui));
     assert!(under(&mut ui).contains("─ 32/64 samples · 0.0 s"), "{}", under(&mut ui));
     ui.worker(done(1, Vec::new(), false));
-    assert!(under(&mut ui).starts_with("parse 250 ms, meshes 250 ms, "), "{}", under(&mut ui));
+    assert!(under(&mut ui).starts_with("parse 250 ms, "), "{}", under(&mut ui));
 }
 
 #[test]
-fn times_are_told_against_those_of_the_last_render() {
+fn stage_times_are_compared_with_the_last() {
     let mut ui = TestUi::new();
     let render = |ui: &mut TestUi, seconds| {
         let generation = ui.state.request.generation;
@@ -201,32 +202,28 @@ fn times_are_told_against_those_of_the_last_render() {
     ui.worker(protocol::Event::Started { generation: ui.state.request.generation });
     ui.press('r');
     render(&mut ui, 2.24);
-    assert!(
-        ui.text().contains("render  2.24 s +1.1 s"),
-        "one that was cancelled does not count: {}",
-        ui.text()
-    );
+    assert!(ui.text().contains("render  2.24 s +1.1 s"), "cancelled renders do not count: {}", ui.text());
 }
 
 #[test]
-fn the_screen_tells_whoever_has_not_saved_yet_to_save() {
+fn save_hint_is_shown_until_the_first_save() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
         for size in SIZES {
             let mut ui = TestUi::with(state(columns, rows));
             rendered(&mut ui, size);
             ui.worker(done(1, Vec::new(), false));
-            // All stages alike leave no room for it in the narrow window.
+            // With all stages, a narrow window has no room for the hint.
             ui.state.work.stages = Default::default();
-            assert!(ui.text().contains("save cornell.toml"), "{}", ui.text());
+            assert!(ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
             ui.event(Event::Changed(Changed { noticed: ui.now }));
             ui.worker(done(2, Vec::new(), false));
-            assert!(!ui.text().contains("save cornell.toml"), "{}", ui.text());
+            assert!(!ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
         }
     }
 }
 
 #[test]
-fn the_folded_line_names_no_file_of_another_picture() {
+fn status_line_lists_only_current_files() {
     let mut ui = TestUi::new();
     let finish = |ui: &mut TestUi| {
         let generation = ui.state.request.generation;
@@ -234,7 +231,7 @@ fn the_folded_line_names_no_file_of_another_picture() {
         ui.worker(done(generation, Vec::new(), false));
         let settings = ui.state.request.effective.as_mut().expect("settings");
         (settings.width, settings.height) = (320, 200);
-        // All stages alike leave no room for a file.
+        // With all stages there is no room for a file.
         ui.state.work.stages = Default::default();
     };
     finish(&mut ui);
@@ -251,11 +248,11 @@ fn the_folded_line_names_no_file_of_another_picture() {
     );
     ui.press('l');
     finish(&mut ui);
-    // A key without another effect clears the message about the move.
+    // A key without another effect removes the message about the move.
     ui.press('?');
     ui.press('?');
     let text = ui.text();
-    assert!(text.contains("not saved · w saves it") && !text.contains("dof.png 63"), "{text}");
+    assert!(text.contains(messages::NOT_SAVED) && !text.contains("dof.png 63"), "{text}");
     ui.press('w');
     ui.worker(protocol::Event::Written {
         generation: 2,
@@ -283,9 +280,9 @@ fn hints_wrap_at_the_width_of_the_panel() {
             own: own(),
         });
         let panel = Layout::of(&ui.state).panel;
-        let hint = "save cornell.toml to render again";
+        let hint = messages::save_to_render("cornell.toml", true);
         assert_eq!(
-            ui.text().contains(hint),
+            ui.text().contains(&hint),
             usize::from(panel.width) >= hint.len(),
             "{panel:?}\n{}",
             ui.text()
@@ -294,7 +291,7 @@ fn hints_wrap_at_the_width_of_the_panel() {
 }
 
 #[test]
-fn a_picture_in_pixels_takes_no_more_memory_in_a_huge_terminal() {
+fn pixel_preview_memory_is_bounded() {
     let by = |protocol, columns, rows, cell_pixels| {
         let kind = PreviewKind::Pixels(protocol);
         let mut state = state_with(columns, rows, kind, ColorDepth::TrueColor, Overrides::default());
@@ -302,7 +299,7 @@ fn a_picture_in_pixels_takes_no_more_memory_in_a_huge_terminal() {
         state.display.pixels_across()
     };
     for (protocol, fine, most) in [(Protocol::Kitty, 10, 2_400_000), (Protocol::Sixel, 8, 1_600_000)] {
-        assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "pixel for pixel");
+        assert_eq!(by(protocol, 80, 24, (8, 16)), 8, "one to one");
         assert_eq!(by(protocol, 200, 60, (20, 40)), fine, "fine enough");
         for (columns, rows) in [(480, 130), (1000, 500), (4000, 2000), (u16::MAX, u16::MAX)] {
             let across = by(protocol, columns, rows, (10, 20));

@@ -1,15 +1,15 @@
-//! The front end driven by scripted events, on a screen without a terminal.
+//! Tests that drive the front end with scripted events, without a terminal.
 
 mod camera;
 mod documented_keys;
 mod edits;
 mod flow;
 mod following;
+mod history;
 mod keys;
 mod layout;
 mod noise;
 mod notices;
-mod older;
 mod overlay;
 mod pointer;
 mod screen;

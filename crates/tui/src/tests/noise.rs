@@ -1,4 +1,4 @@
-//! Tests of the words about noise.
+//! How noise is reported.
 
 use super::RED;
 use crate::event::Event;
@@ -6,14 +6,14 @@ use crate::fixtures::*;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
 
 #[test]
-fn the_noise_is_told_as_it_falls() {
+fn noise_is_shown_as_it_falls() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     let noise = Some(NoiseProgress { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
     let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
     ui.worker(protocol::Event::Progress { generation: 1, progress });
     for (columns, rows, words) in [
-        (80, 24, "noise 2.1 %, 1 % in about 14 s · 32/64 samples"),
+        (80, 24, "noise 2.1 % → 1 % in about 14 s · 32/64 samples"),
         (54, 20, "noise 2.1 % · 32/64 samples"),
         (36, 20, "32/64 samples"),
     ] {
@@ -21,14 +21,14 @@ fn the_noise_is_told_as_it_falls() {
         assert!(ui.text().contains(words), "{words}: {}", ui.text());
     }
     assert!(!ui.text().contains("noise"), "{}", ui.text());
-    // A pause has no end that is known.
+    // The end of a pause is not known.
     ui.event(Event::Resize(window(80, 24)));
     ui.press(' ');
     assert!(ui.text().contains("noise 2.1 % · 32/64 samples"), "{}", ui.text());
 }
 
 #[test]
-fn samples_have_no_total_while_noise_decides_it() {
+fn noise_target_has_no_sample_total() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
@@ -43,10 +43,10 @@ fn samples_have_no_total_while_noise_decides_it() {
         generation: 1,
         progress: RenderProgress { is_total_fixed: false, ..progress(0.5, None) },
     });
-    assert!(ui.text().contains("about 32 samples per pixel"), "{}", ui.text());
+    assert!(ui.text().contains("about 32 samples"), "{}", ui.text());
 }
 
-/// The end of a render with `error`, or with a budget of time: whether it was complete, and the samples that it had.
+/// The screen after a render with `error` or a time limit. `complete` and `samples` are its result.
 fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
     let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
     let (kind, depth) = (crate::preview_kind::PreviewKind::HalfBlock, crate::color::ColorDepth::None);
@@ -59,29 +59,29 @@ fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) ->
 }
 
 #[test]
-fn what_ended_a_render_is_told_if_several_things_could() {
+fn limit_that_ended_the_render_is_shown() {
     for (error, time, complete, samples, words) in [
-        (0.02, None, true, 40, "2 % a tile ✓"),
-        (0.02, None, true, 64, "ended by samples"),
-        (0.02, Some(5.0), false, 40, "ended by time"),
-        (0.0, Some(5.0), false, 40, "ended by time"),
-        (0.0, Some(5.0), true, 64, "ended by samples"),
+        (0.02, None, true, 40, "2 % per tile ✓"),
+        (0.02, None, true, 64, "stopped at max. samples"),
+        (0.02, Some(5.0), false, 40, "stopped at time limit"),
+        (0.0, Some(5.0), false, 40, "stopped at time limit"),
+        (0.0, Some(5.0), true, 64, "stopped at max. samples"),
     ] {
         let text = ended(error, time, complete, samples).split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains(words), "{words}: {text}");
         assert_eq!(text.contains("✓ ") && text.contains("tile ✓"), words.contains("✓"), "{text}");
-        assert_eq!(text.contains("ended by"), words.contains("ended"), "{text}");
+        assert_eq!(text.contains("stopped at"), words.contains("stopped"), "{text}");
     }
     let plain = ended(0.0, None, true, 64);
-    assert!(!plain.contains("ended"), "{plain}");
+    assert!(!plain.contains("stopped"), "{plain}");
 }
 
 #[test]
-fn noise_is_told_of_the_whole_picture_and_what_is_asked_of_a_tile() {
+fn noise_of_image_and_target_per_tile_are_shown() {
     let mut ui = TestUi::new();
     ui.finish(RED);
-    assert!(ui.text().contains("0.81 % in all") && !ui.text().contains("a tile"), "{}", ui.text());
-    for (samples, words) in [(64, "0.5 % a tile "), (256, "0.5 % a tile ✓")] {
+    assert!(ui.text().contains("noise    0.81 %") && !ui.text().contains("per tile"), "{}", ui.text());
+    for (samples, words) in [(64, "0.5 % per tile "), (256, "0.5 % per tile ✓")] {
         ui.state.request.effective.as_mut().expect("settings").error = 0.005;
         ui.state.request.effective.as_mut().expect("settings").samples = samples;
         assert!(ui.text().contains(words), "{words}: {}", ui.text());
@@ -93,5 +93,5 @@ fn noise_has_two_digits() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.state.work.report.as_mut().expect("a report").image.error = Some(0.4312);
-    assert!(ui.text().contains("43 % in all"), "{}", ui.text());
+    assert!(ui.text().contains("noise    43 %"), "{}", ui.text());
 }

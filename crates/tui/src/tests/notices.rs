@@ -1,17 +1,18 @@
-//! Tests of notices: they expire, and leave progress and results in sight.
+//! Notices expire, and do not hide progress and results.
 
 use super::{BLUE, RED};
 use crate::event::Event;
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol;
 
 const WINDOWS: [(u16, u16); 5] = [(60, 20), (80, 24), (100, 30), (120, 40), (200, 60)];
 const SHORT: &str = "exposure +0.25";
-const LONG: &str = "camera moved (preview only). w: save image · c: keep in scene · 0: reset";
-const LONGER: &str = "the camera was saved since keys moved it: camera.position = [0, 1, 4.5], camera.fov = 35; \
-    press c again to write over it, or 0 to go back to the saved one";
+const LONG: &str = messages::CAMERA_MOVED;
+const LONGER: &str = "camera.position = [0, 1, 4.5], camera.fov = 35, camera.focus = 4.25 was saved since you moved the camera: \
+    press c again to overwrite it, or 0 to reset the camera";
 
-/// A desk on whose screen a notice stands while a render is half done.
+/// A UI that shows a notice while a render is half done.
 fn half_done(window: (u16, u16), notice: &str) -> TestUi {
     let mut ui = TestUi::with(state(window.0, window.1));
     ui.finish(RED);
@@ -24,7 +25,7 @@ fn half_done(window: (u16, u16), notice: &str) -> TestUi {
 }
 
 #[test]
-fn a_notice_expires_after_four_seconds() {
+fn notice_expires_after_four_seconds() {
     for window in WINDOWS {
         let mut ui = TestUi::with(state(window.0, window.1));
         ui.finish(RED);
@@ -33,14 +34,14 @@ fn a_notice_expires_after_four_seconds() {
         assert!(ui.text().contains(SHORT), "{}", ui.text());
         ui.wait(3900);
         assert!(ui.text().contains(SHORT), "{}", ui.text());
-        // Nothing else happens meanwhile: the loop has to wake up for it.
+        // Nothing else happens, so the event loop must wake up for it.
         let wake = ui.state.next_tick().expect("a tick");
         assert!(wake <= ui.now + std::time::Duration::from_millis(100));
         ui.state.dirty = false;
         ui.wait(100);
         assert!(ui.state.dirty);
         let rows = ui.text();
-        // The line of keys has it as what `0` resets.
+        // The line of keys contains it as what `0` resets.
         let above = rows.lines().rev().skip(1).any(|row| row.contains(SHORT));
         assert!(!above, "{rows}");
         assert_eq!(ui.state.next_tick(), None);
@@ -48,7 +49,7 @@ fn a_notice_expires_after_four_seconds() {
 }
 
 #[test]
-fn a_later_notice_has_its_own_four_seconds() {
+fn later_notice_has_its_own_four_seconds() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press(']');
@@ -56,11 +57,11 @@ fn a_later_notice_has_its_own_four_seconds() {
     ui.press(']');
     ui.finish(BLUE);
     ui.wait(3000);
-    assert!(ui.text().contains("exposure +0.5"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::exposure("+0.5")), "{}", ui.text());
 }
 
 #[test]
-fn a_notice_leaves_progress_in_sight() {
+fn notice_does_not_hide_progress() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
             let mut ui = half_done(window, notice);
@@ -74,7 +75,7 @@ fn a_notice_leaves_progress_in_sight() {
 }
 
 #[test]
-fn a_notice_leaves_the_written_file_in_sight() {
+fn notice_does_not_hide_the_written_file() {
     for window in WINDOWS {
         for notice in [SHORT, LONG, LONGER] {
             let mut ui = TestUi::with(state(window.0, window.1));
@@ -91,9 +92,9 @@ fn a_notice_leaves_the_written_file_in_sight() {
     }
 }
 
-/// Where there is no line under the image, the notice takes the place of the keys, for its time.
+/// Without a status line, a notice replaces the line of keys.
 #[test]
-fn in_a_low_window_the_keys_return() {
+fn low_window_shows_keys_after_a_notice() {
     let mut ui = TestUi::with(state(60, 8));
     ui.finish(RED);
     ui.press(']');
@@ -104,11 +105,11 @@ fn in_a_low_window_the_keys_return() {
 }
 
 #[test]
-fn faults_and_prompts_stay_until_a_key() {
+fn errors_and_prompts_stay_until_a_key() {
     let failed = protocol::Event::WriteFailed {
         generation: 1,
         path: Some("cornell.png".into()),
-        message: "cannot write cornell.png: disk full".to_owned(),
+        message: "disk full".to_owned(),
     };
     let mut ui = TestUi::new();
     ui.finish(RED);
@@ -117,9 +118,9 @@ fn faults_and_prompts_stay_until_a_key() {
     assert!(ui.text().contains("disk full"), "{}", ui.text());
     ui.press('f');
     ui.wait(60_000);
-    assert!(ui.text().contains("click where to focus"), "{}", ui.text());
+    assert!(ui.text().contains(messages::CLICK_TO_FOCUS), "{}", ui.text());
     ui.press('f');
     ui.event(Event::Lost(crate::event::EventSource::Watcher));
     ui.wait(60_000);
-    assert!(ui.text().contains("no longer watched"), "{}", ui.text());
+    assert!(ui.text().contains(messages::NOT_WATCHING), "{}", ui.text());
 }

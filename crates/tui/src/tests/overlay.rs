@@ -1,4 +1,4 @@
-//! Tests of overlays: the help, the list of views, the errors.
+//! Overlays: help, list of views, diagnostics.
 
 use crossterm::event::KeyCode;
 
@@ -17,7 +17,7 @@ const VIEWS: u16 = View::ALL.len() as u16;
 const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
 
 #[test]
-fn the_help_shows_every_line_of_the_tables_in_every_window() {
+fn help_shows_every_key_in_every_window() {
     for (columns, rows) in [(80, 24), (120, 40), (80, 12), (80, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.press('?');
@@ -39,7 +39,7 @@ fn the_help_shows_every_line_of_the_tables_in_every_window() {
 }
 
 #[test]
-fn the_help_scrolls_by_every_key_and_stops_at_its_ends() {
+fn help_scrolls_with_every_key_to_its_ends() {
     let mut ui = TestUi::with(state(60, 12));
     ui.press('?');
     let top = ui.text();
@@ -55,28 +55,28 @@ fn the_help_scrolls_by_every_key_and_stops_at_its_ends() {
         ui.key(back);
         assert_eq!(ui.text(), top, "{back:?}");
         ui.key(back);
-        assert!(!ui.state.dirty, "the top is the top");
+        assert!(!ui.state.dirty, "at the top");
     }
     for _ in 0..60 {
         ui.press('j');
     }
     ui.screen();
     ui.press('j');
-    assert!(!ui.state.dirty, "the end is the end");
+    assert!(!ui.state.dirty, "at the end");
     ui.press('?');
     ui.press('?');
-    assert_eq!(ui.text(), top, "it opens at its top");
+    assert_eq!(ui.text(), top, "opens at the top");
 }
 
 #[test]
-fn the_help_can_be_read_in_a_small_window() {
+fn help_is_readable_in_a_small_window() {
     for (columns, rows) in [(40, 12), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.press('?');
         let mut seen = String::new();
         for _ in 0..200 {
             assert!(!ui.text().contains('…'), "{}", ui.text());
-            // The first line of the page: each line is there once.
+            // The first line of each page, so each line is collected once.
             let line = ui.text().lines().nth(1).map(str::to_owned).unwrap_or_default();
             seen += &line.replace(['│', '╭', '╮'], " ");
             ui.press('j');
@@ -90,7 +90,7 @@ fn the_help_can_be_read_in_a_small_window() {
 }
 
 #[test]
-fn scrolling_is_offered_where_there_is_something_to_scroll() {
+fn scroll_keys_are_shown_only_when_needed() {
     for (rows, is_long) in [(24, true), (60, false)] {
         let mut ui = TestUi::with(state(80, rows));
         ui.press('?');
@@ -106,7 +106,7 @@ fn scrolling_is_offered_where_there_is_something_to_scroll() {
 }
 
 #[test]
-fn the_help_leaves_no_cut_words_beside_it() {
+fn help_leaves_no_cut_words_beside_it() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     ui.press('?');
@@ -117,19 +117,19 @@ fn the_help_leaves_no_cut_words_beside_it() {
 }
 
 #[test]
-fn the_way_out_of_the_help_is_told_before_its_pages() {
+fn help_shows_how_to_close_it() {
     let mut ui = TestUi::with(state(40, 12));
     ui.press('?');
     assert!(ui.text().contains("esc close"), "{}", ui.text());
 }
 
 #[test]
-fn views_are_listed_and_chosen_by_digits() {
+fn views_are_chosen_by_digits() {
     for (columns, rows) in [(80, 24), (120, 40), (120, 24), (40, 12), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);
         ui.press('5');
-        assert_eq!(ui.state.request.view(), View::Beauty, "no list, no digits");
+        assert_eq!(ui.state.request.view(), View::Beauty, "no digits without the list");
         ui.press('v');
         let text = ui.text();
         assert!(
@@ -140,7 +140,7 @@ fn views_are_listed_and_chosen_by_digits() {
         let wanted = request(&effects).expect("a request").overrides.view;
         assert_eq!(wanted, Some(View::Depth));
         assert!(ui.text().contains("▸3 depth"), "{}", ui.text());
-        // A digit always means the same view.
+        // A digit always chooses the same view.
         for _ in 0..7 {
             ui.press('v');
         }
@@ -155,7 +155,7 @@ fn views_are_listed_and_chosen_by_digits() {
 }
 
 #[test]
-fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
+fn keys_navigate_the_open_list_of_views() {
     for (columns, rows) in [(80, 24), (120, 40), (200, 60), (30, 8)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);
@@ -169,11 +169,11 @@ fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
             let is_marked = |line: &str| line.contains('▸') && line.contains(view.name());
             assert!(text.lines().any(is_marked), "{} at {columns}×{rows}:\n{text}", view.name());
         }
-        assert!(ui.press('j').is_empty(), "the end is the end");
+        assert!(ui.press('j').is_empty(), "at the end");
         assert_eq!(request(&ui.press('k')).and_then(|it| it.overrides.view), Some(View::Samples));
         for key in [KeyCode::Left, KeyCode::Right, KeyCode::Up] {
             ui.key(KeyPress::special(key));
-            assert!(!ui.state.request.toggles.camera.is_any(), "{key:?} belongs to the list");
+            assert!(!ui.state.request.toggles.camera.is_any(), "{key:?} is for the list");
         }
         ui.key(KeyPress::special(KeyCode::Enter));
         assert!(!ui.text().contains('▸'), "{}", ui.text());
@@ -183,29 +183,29 @@ fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
 }
 
 #[test]
-fn a_view_is_found_by_its_name() {
+fn views_are_found_by_name() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press('v');
     assert!(ui.press('/').is_empty());
     ui.press('d');
-    assert_eq!(ui.state.request.view(), View::Depth, "the first that begins so");
+    assert_eq!(ui.state.request.view(), View::Depth, "the first match");
     ui.press('i');
     assert_eq!(ui.state.request.view(), View::Diffuse);
     assert!(ui.text().contains("/ di"), "{}", ui.text());
     ui.key(KeyPress::special(KeyCode::Backspace));
     assert_eq!(ui.state.request.view(), View::Depth);
     for letter in "qqq".chars() {
-        assert!(ui.press(letter).is_empty(), "it quits nothing");
+        assert!(ui.press(letter).is_empty(), "q does not quit");
     }
-    assert_eq!(ui.state.request.view(), View::Depth, "no name has these letters");
+    assert_eq!(ui.state.request.view(), View::Depth, "no match");
     ui.key(KeyPress::special(KeyCode::Enter));
     assert!(ui.state.overlays.views.is_none());
     assert_eq!(ui.state.request.view(), View::Depth);
 }
 
 #[test]
-fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
+fn list_of_views_cuts_nothing_below() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
     let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
@@ -229,17 +229,17 @@ fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
 }
 
 #[test]
-fn the_list_of_views_goes_by_itself() {
+fn list_of_views_closes_automatically() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.press('v');
     ui.finish(RED);
-    let wake = ui.state.next_tick().expect("the list asks to be woken");
+    let wake = ui.state.next_tick().expect("a wakeup for the list");
     assert!(wake > ui.now);
     ui.wait(3000);
     ui.press('v');
     ui.wait(3000);
-    assert!(ui.text().contains("▸3 depth"), "each key gives it another moment");
+    assert!(ui.text().contains("▸3 depth"), "each key keeps it open");
     ui.wait(2000);
     assert!(ui.state.dirty && !ui.text().contains("▸"));
     ui.finish(RED);
@@ -247,7 +247,7 @@ fn the_list_of_views_goes_by_itself() {
 }
 
 #[test]
-fn a_list_of_views_that_is_cut_off_says_so_and_lies_over_no_message() {
+fn cut_list_of_views_is_marked() {
     for (columns, rows, is_cut) in [(40, 10, true), (30, 8, true), (40, 16, false)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.finish(RED);
@@ -255,8 +255,7 @@ fn a_list_of_views_that_is_cut_off_says_so_and_lies_over_no_message() {
         let text = ui.text();
         assert!(text.contains('▾') == is_cut && !text.contains('▴'), "{columns}×{rows}\n{text}");
         assert!(text.contains("1-9 choose"), "{columns}×{rows}\n{text}");
-        let words = ["preview only", "save image"];
-        assert!(!words.iter().any(|words| text.contains(words)), "{columns}×{rows}\n{text}");
+        assert!(!text.contains("(preview"), "{columns}×{rows}\n{text}");
         // The mark scrolls with the view.
         for _ in 0..View::ALL.len() {
             ui.press('j');
@@ -270,15 +269,15 @@ fn a_list_of_views_that_is_cut_off_says_so_and_lies_over_no_message() {
     ui.finish(RED);
     ui.press('v');
     let text = ui.text();
-    assert!(!text.contains(['▴', '▾']) && text.contains("view normal (preview only)"), "{text}");
+    assert!(!text.contains(['▴', '▾']) && text.contains(&messages::view("normal")), "{text}");
 }
 
 #[test]
-fn of_a_fault_in_many_places_ten_are_told() {
+fn ten_positions_of_a_fault_are_shown() {
     let mut ui = TestUi::with(state(120, 40));
-    ui.fail((1..=20).map(|line| at(Severity::Error, "no material is named `wal`", line)).collect());
+    ui.fail((1..=20).map(|line| at(Severity::Error, "unknown `wal`", line)).collect());
     let text = ui.text();
-    let words = "also in 19 places: 2:1, 3:1, 4:1, 5:1, 6:1, 7:1, 8:1, 9:1, 10:1 and 10 more";
+    let words = ": 2:1, 3:1, 4:1, 5:1, 6:1, 7:1, 8:1, 9:1, 10:1 and 10 more";
     assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{text}");
 }
 
@@ -289,9 +288,9 @@ fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
 }
 
 #[test]
-fn errors_come_before_warnings_and_one_fault_is_told_once_with_its_places() {
+fn errors_come_first_and_faults_are_merged() {
     let mut ui = TestUi::with(state(120, 40));
-    let material = |line| at(Severity::Error, "no material is named `wal`", line);
+    let material = |line| at(Severity::Error, "unknown `wal`", line);
     ui.fail(vec![
         at(Severity::Warning, "texture `b` is not used", 1),
         material(12),
@@ -301,17 +300,14 @@ fn errors_come_before_warnings_and_one_fault_is_told_once_with_its_places() {
     ]);
     let text = ui.text();
     assert!(text.contains("4 errors"), "{text}");
-    assert_eq!(text.matches("no material is named").count(), 1, "{text}");
-    assert!(
-        text.contains("scenes/cornell.toml:5:1") && text.contains("also in 2 places: 12:1, 17:1"),
-        "{text}"
-    );
+    assert_eq!(text.matches("unknown `wal`").count(), 1, "{text}");
+    assert!(text.contains("cornell.toml:5:1") && text.contains(": 12:1, 17:1"), "{text}");
     let place = |words: &str| text.find(words).unwrap_or_else(|| panic!("{words} is not in\n{text}"));
     assert!(place("radios") < place("wal`") && place("wal`") < place("not used"), "{text}");
 }
 
 #[test]
-fn errors_lie_beside_the_picture_where_there_is_room() {
+fn diagnostics_are_beside_the_image_if_possible() {
     for (columns, rows, width, is_beside) in
         [(160, 40, 640, true), (80, 60, 640, true), (80, 24, 480, true), (80, 24, 640, false)]
     {
@@ -326,36 +322,36 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
             own: own(),
         });
         let before = cells_of(&mut ui, RED);
-        ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-        assert!(ui.text().contains("error: unknown key `heigth`"), "{}", ui.text());
+        ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
+        assert!(ui.text().contains("error: misspelled"), "{}", ui.text());
         let after = cells_of(&mut ui, RED);
         assert_eq!(after == before, is_beside, "{after} of {before} at {columns}×{rows}\n{}", ui.text());
     }
 }
 
 #[test]
-fn keys_do_not_open_errors_again_that_were_closed() {
+fn closed_diagnostics_stay_closed() {
     let mut ui = TestUi::new();
     ui.finish(RED);
-    let fault = || vec![diagnostic(Severity::Error, "unknown key `heigth`")];
+    let fault = || vec![diagnostic(Severity::Error, "misspelled")];
     ui.fail(fault());
     ui.key(ESCAPE);
     ui.press('v');
     ui.fail(fault());
     assert!(!ui.state.overlays.diagnostics.open, "{}", ui.text());
     ui.fail(vec![diagnostic(Severity::Error, "another one")]);
-    assert!(ui.state.overlays.diagnostics.open, "what is new is shown");
+    assert!(ui.state.overlays.diagnostics.open, "new errors open it");
 }
 
 #[test]
-fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
+fn camera_steps_wait_while_the_scene_is_broken() {
     let mut ui = TestUi::new();
     ui.finish(RED);
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
     let first = ui.press('h');
     assert!(request(&first).is_some());
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
-    assert!(request(&ui.press('h')).is_none(), "the first has no picture yet");
+    ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
+    assert!(request(&ui.press('h')).is_none(), "the first step has no preview yet");
     let generation = ui.state.request.generation;
     let picture = plain_picture(50, 38, RED);
     let effects = ui.event(Event::Picture {
@@ -370,17 +366,17 @@ fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
 }
 
 #[test]
-fn of_more_errors_than_anybody_reads_the_first_are_shown() {
+fn number_of_shown_errors_is_limited() {
     let mut ui = TestUi::with(state(120, 40));
     ui.fail((0..20_000).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     for _ in 0..100 {
         ui.key(KeyPress::special(KeyCode::PageDown));
     }
-    assert!(ui.text().contains("… 19900 more faults are not shown"), "{}", ui.text());
+    assert!(ui.text().contains("… 19900 more"), "{}", ui.text());
 }
 
 #[test]
-fn errors_scroll_by_every_key() {
+fn diagnostics_scroll_with_every_key() {
     let mut ui = TestUi::new();
     ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     let top = ui.text();
@@ -402,7 +398,7 @@ fn errors_scroll_by_every_key() {
 }
 
 #[test]
-fn a_long_failure_is_wrapped_between_words() {
+fn long_failure_is_wrapped_between_words() {
     let mut ui = TestUi::with(state(40, 12));
     let failure =
         Failure::Work("cannot write /a/rather/long/name/of/a/folder/image.png: no such folder".to_owned());
@@ -411,7 +407,7 @@ fn a_long_failure_is_wrapped_between_words() {
 }
 
 #[test]
-fn a_resize_keeps_what_is_open_in_the_window() {
+fn resize_keeps_overlays_open() {
     let mut ui = TestUi::new();
     ui.press('?');
     for (columns, rows) in [(30, 8), (200, 60), (10, 2), (1, 1), (80, 24)] {

@@ -1,4 +1,4 @@
-//! Tests of the screen.
+//! The screen as a whole.
 
 use std::time::Duration;
 
@@ -12,25 +12,27 @@ use crate::event::FrameReport;
 use crate::event::{Event, KeyPress};
 use crate::fixtures::*;
 use crate::keymap::KEYMAP;
+use crate::messages;
 use crate::pipeline::protocol::{self, Failure, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::settings::{Overrides, View};
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
 
 #[test]
-fn the_picture_is_in_half_blocks_in_the_middle_of_its_area() {
+fn preview_uses_half_blocks_in_the_middle() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let screen = ui.screen();
-    // 56 × 21 cells are as large as 50:38 gets in 21 rows, but for a column; the area begins in row 1.
+    // Except for a column, 56 × 21 cells are the largest that 50:38 allows in 21 rows. The area starts in row
+    // 1.
     let cell = &screen[(25, 10)];
     assert_eq!((cell.symbol(), cell.fg, cell.bg), ("▀", Color::Rgb(200, 20, 10), Color::Rgb(200, 20, 10)));
     assert_eq!(cells_of(&mut ui, RED), 55 * 21);
-    assert_ne!(screen[(56, 10)].symbol(), "▀", "the picture ends where the stages begin");
+    assert_ne!(screen[(56, 10)].symbol(), "▀", "the image ends at the panel");
 }
 
 #[test]
-fn upper_and_lower_pixels_are_foreground_and_background() {
+fn half_blocks_show_two_pixels() {
     let mut ui = TestUi::new();
     let generation = ui.state.request.generation;
     let mut picture = (*plain_picture(56, 42, RED)).clone();
@@ -54,7 +56,7 @@ fn upper_and_lower_pixels_are_foreground_and_background() {
 }
 
 #[test]
-fn without_colors_the_picture_is_a_ramp_and_nothing_has_a_color() {
+fn monochrome_preview_is_a_ramp_without_colors() {
     let state = state_with(80, 24, PreviewKind::Ascii, ColorDepth::None, Overrides::default());
     let mut ui = TestUi::with(state);
     ui.finish([255; 3]);
@@ -65,7 +67,7 @@ fn without_colors_the_picture_is_a_ramp_and_nothing_has_a_color() {
 }
 
 #[test]
-fn what_a_picture_is_stretched_to_stands_beside_its_view() {
+fn range_is_shown_with_the_view() {
     let base = Overrides { view: Some(View::Depth), ..Overrides::default() };
     let state = state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
     let mut ui = TestUi::with(state);
@@ -89,7 +91,7 @@ fn what_a_picture_is_stretched_to_stands_beside_its_view() {
 }
 
 #[test]
-fn a_picture_that_lies_about_its_size_is_not_shown() {
+fn image_of_the_wrong_size_is_not_shown() {
     let mut ui = TestUi::new();
     let mut picture = (*plain_picture(4, 4, RED)).clone();
     picture.pixels.truncate(3);
@@ -105,7 +107,7 @@ fn a_picture_that_lies_about_its_size_is_not_shown() {
 }
 
 #[test]
-fn the_table_shows_each_stage_as_it_stands() {
+fn table_shows_the_status_of_each_stage() {
     let mut ui = TestUi::new();
     for report in [
         stage(Stage::Parse, Status::Done, 0.0004, ""),
@@ -122,7 +124,7 @@ fn the_table_shows_each_stage_as_it_stands() {
 }
 
 #[test]
-fn the_bar_of_an_asset_fills_stays_a_moment_and_goes() {
+fn asset_bar_fills_lingers_and_disappears() {
     let mut ui = TestUi::new();
     let asset = |done| protocol::Event::Asset { generation: 1, progress: asset("bricks", done, 8) };
     ui.worker(asset(3));
@@ -138,7 +140,7 @@ fn the_bar_of_an_asset_fills_stays_a_moment_and_goes() {
 }
 
 #[test]
-fn a_bar_goes_with_its_stage_and_moves_nothing() {
+fn asset_bar_disappears_with_its_stage() {
     let mut ui = TestUi::new();
     let of = |name, status| protocol::Event::Stage { generation: 1, stage: stage(name, status, 0.1, "") };
     let row = |ui: &mut TestUi, words: &str| ui.text().lines().position(|line| line.contains(words));
@@ -149,7 +151,7 @@ fn a_bar_goes_with_its_stage_and_moves_nothing() {
     assert!(ui.text().contains("━━━━━━━━ 100 %") && row(&mut ui, "save cornell.toml") == hint);
     ui.worker(of(Stage::Photons, Status::Done));
     assert!(!ui.text().contains("100 %") && row(&mut ui, "save cornell.toml") == hint, "{}", ui.text());
-    // Nor does one outlive the render.
+    // No bar outlives the render.
     ui.worker(protocol::Event::Asset { generation: 1, progress: asset("knot.obj", 2, 2) });
     ui.worker(done(1, Vec::new(), false));
     assert!(!ui.text().contains("knot.obj"), "{}", ui.text());
@@ -157,7 +159,7 @@ fn a_bar_goes_with_its_stage_and_moves_nothing() {
 }
 
 #[test]
-fn no_eta_is_shown_early_and_none_is_absurd() {
+fn eta_is_never_early_or_absurd() {
     let mut ui = TestUi::new();
     let mut eta = |progress: RenderProgress| {
         ui.worker(protocol::Event::Progress { generation: 1, progress });
@@ -173,7 +175,7 @@ fn no_eta_is_shown_early_and_none_is_absurd() {
 }
 
 #[test]
-fn the_render_bar_tells_percent_samples_and_what_is_to_go() {
+fn render_bar_shows_percent_samples_and_eta() {
     let mut ui = TestUi::new();
     ui.now += Duration::from_millis(1200);
     ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.25, None) });
@@ -187,11 +189,11 @@ fn the_render_bar_tells_percent_samples_and_what_is_to_go() {
     ui.worker(protocol::Event::Progress { generation: 1, progress: progress(1.0, Some(0.0)) });
     ui.worker(done(1, Vec::new(), false));
     let text = ui.text();
-    assert!(text.contains("1.93 s · run 1\n") && !text.contains(['━', '─']), "{text}");
+    assert!(text.contains("1.93 s · render 1\n") && !text.contains(['━', '─']), "{text}");
 }
 
 #[test]
-fn a_written_image_is_named_with_its_size() {
+fn written_file_is_shown_with_its_size() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.worker(protocol::Event::Written {
@@ -204,11 +206,11 @@ fn a_written_image_is_named_with_its_size() {
     for words in ["→ out/cornell.png", "  210.4 kB, 640×480"] {
         assert!(text.contains(words), "{words:?} is not in\n{text}");
     }
-    assert!(!text.contains("wrote"), "the keys stay in sight\n{text}");
+    assert!(!text.contains("wrote"), "the keys are visible\n{text}");
 }
 
 #[test]
-fn a_key_that_writes_is_answered_when_all_files_are_written() {
+fn w_is_confirmed_after_all_files() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let written =
@@ -216,23 +218,23 @@ fn a_key_that_writes_is_answered_when_all_files_are_written() {
     let done = || protocol::Event::WriteDone { generation: 1, paths: vec!["a.png".into(), "b.ppm".into()] };
     ui.press('w');
     ui.worker(written("a.png"));
-    // The same key before the second file of the first order is written.
+    // The key is pressed again before the second file of the first write.
     ui.press('w');
     ui.worker(written("b.ppm"));
     assert!(!ui.text().contains("wrote"), "{}", ui.text());
     for _ in 0..2 {
         ui.worker(done());
-        assert!(ui.text().contains("wrote a.png, b.ppm"), "{}", ui.text());
+        assert!(ui.text().contains(&messages::wrote("a.png, b.ppm")), "{}", ui.text());
     }
-    // A request that came in between does not keep the answer back.
+    // A request in between does not prevent the confirmation.
     ui.press('w');
     ui.press('r');
     ui.worker(done());
-    assert!(ui.text().contains("wrote a.png, b.ppm"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::wrote("a.png, b.ppm")), "{}", ui.text());
 }
 
 #[test]
-fn words_beside_a_stage_are_not_cut_in_the_middle() {
+fn stage_reasons_are_wrapped_between_words() {
     let mut ui = TestUi::new();
     let stage = |why: &str| StageReport {
         name: Stage::Meshes,
@@ -241,29 +243,26 @@ fn words_beside_a_stage_are_not_cut_in_the_middle() {
         processor_seconds: 0.0,
         why: why.to_owned(),
     };
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage("no need") });
+    let (short, long) = ("not in the scene", "not needed in this scene");
+    ui.worker(protocol::Event::Stage { generation: 1, stage: stage("unneeded") });
     ui.event(Event::Resize(window(100, 24)));
-    assert!(ui.text().contains("skipped  no need"), "{}", ui.text());
+    assert!(ui.text().contains("skipped  unneeded"), "{}", ui.text());
     ui.event(Event::Resize(window(80, 24)));
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage("the scene names none") });
-    assert!(ui.text().contains("  the scene names none"), "{}", ui.text());
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage("there is none in this scene") });
+    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(short) });
+    assert!(ui.text().contains(&format!("  {short}")), "{}", ui.text());
+    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(long) });
     let text = ui.text();
-    assert!(text.contains("  there is none in this") && text.contains("  scene"), "{text}");
-    // Below the picture there is one row for each.
+    assert!(text.contains(&format!("  {}", &long[..18])) && text.contains("  scene"), "{text}");
+    // Below the image, each stage has one row.
     ui.event(Event::Resize(window(80, 37)));
-    assert!(
-        !ui.text().contains("there is none in this scene") && ui.text().contains("skipped"),
-        "{}",
-        ui.text()
-    );
-    ui.worker(protocol::Event::Stage { generation: 1, stage: stage("the scene names none") });
+    assert!(!ui.text().contains(long) && ui.text().contains("skipped"), "{}", ui.text());
+    ui.worker(protocol::Event::Stage { generation: 1, stage: stage(short) });
     ui.event(Event::Resize(window(200, 60)));
-    assert!(ui.text().contains("the scene names none"), "{}", ui.text());
+    assert!(ui.text().contains(short), "{}", ui.text());
 }
 
 #[test]
-fn a_stage_that_failed_does_not_look_at_work() {
+fn failed_stage_is_not_shown_as_running() {
     let mut ui = TestUi::new();
     let stage = StageReport {
         name: Stage::Parse,
@@ -276,25 +275,25 @@ fn a_stage_that_failed_does_not_look_at_work() {
     assert!(ui.text().contains("> parse"));
     let failure = Failure::Scene(vec![diagnostic(Severity::Error, "wrong")]);
     ui.worker(protocol::Event::Failed { generation: 1, failure });
-    assert!(!ui.text().contains("parse"), "the stages of a broken scene tell nothing: {}", ui.text());
+    assert!(!ui.text().contains("parse"), "stages of a broken scene: {}", ui.text());
 }
 
 #[test]
-fn renders_are_counted_and_requests_that_change_nothing_are_not() {
+fn only_changed_renders_are_counted() {
     let mut ui = TestUi::new();
     ui.finish(RED);
-    assert!(ui.text().contains("· run 1"), "{}", ui.text());
+    assert!(ui.text().contains("· render 1"), "{}", ui.text());
     ui.press('0');
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.worker(done(2, Vec::new(), true));
-    assert!(ui.text().contains("unchanged · run 1"), "{}", ui.text());
+    assert!(ui.text().contains("unchanged · render 1"), "{}", ui.text());
     ui.press('r');
     ui.worker(done(3, Vec::new(), false));
-    assert!(ui.text().contains("· run 2"), "{}", ui.text());
+    assert!(ui.text().contains("· render 2"), "{}", ui.text());
 }
 
 #[test]
-fn a_file_that_is_gone_is_missing_and_not_broken() {
+fn deleted_file_is_missing_not_broken() {
     let mut ui = TestUi::with(state(120, 30));
     ui.finish(RED);
     let absent = *crate::scene::text_now("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
@@ -303,22 +302,22 @@ fn a_file_that_is_gone_is_missing_and_not_broken() {
     ui.event(Event::Settled);
     let text = ui.text();
     assert!(text.starts_with(" ✗ missing "), "{text}");
-    assert!(!text.contains("broken") && text.contains("stays until the file is back"), "{text}");
+    assert!(!text.contains("broken") && text.contains(messages::LAST_GOOD_RENDER), "{text}");
     ui.fail(vec![diagnostic(Severity::Error, "unknown key")]);
     assert!(ui.text().starts_with(" ✗ broken "), "{}", ui.text());
 }
 
 #[test]
-fn a_broken_file_keeps_the_picture_and_shows_the_place() {
+fn broken_file_keeps_the_image() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let before = cells_of(&mut ui, RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+    ui.fail(vec![diagnostic(Severity::Error, "unknown `heigth`")]);
     ui.event(Event::Settled);
     let text = ui.text();
     for words in [
-        "error: unknown key `heigth`",
+        "error: unknown `heigth`",
         "scenes/cornell.toml:3:1",
         "3 | heigth = 4",
         "| ^^^^^^ here",
@@ -329,17 +328,17 @@ fn a_broken_file_keeps_the_picture_and_shows_the_place() {
         assert!(text.contains(words), "{words:?} is not in\n{text}");
     }
     let after = cells_of(&mut ui, RED);
-    assert!(after >= before / 2, "{after} of {before} cells are left");
+    assert!(after >= before / 2, "{after} of {before} cells");
 
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    assert!(ui.text().contains("heigth"), "the pane stays until the file is whole");
+    assert!(ui.text().contains("heigth"), "the pane stays until the file is read");
     ui.finish(BLUE);
     assert!(!ui.text().contains("heigth"));
     assert_eq!((cells_of(&mut ui, BLUE), cells_of(&mut ui, RED)), (before, 0));
 }
 
 #[test]
-fn long_errors_are_scrolled_and_stop_at_their_ends() {
+fn long_diagnostics_scroll_to_their_ends() {
     let mut ui = TestUi::new();
     ui.fail((0..9).map(|i| diagnostic(Severity::Error, &format!("wrong number {i}"))).collect());
     assert!(ui.text().contains("wrong number 0") && !ui.text().contains("wrong number 8"));
@@ -353,7 +352,7 @@ fn long_errors_are_scrolled_and_stop_at_their_ends() {
     assert!(text.contains("wrong number 8") && !text.contains("wrong number 0"), "{text}");
     ui.screen();
     ui.key(down);
-    assert!(!ui.state.dirty, "the end is the end");
+    assert!(!ui.state.dirty, "at the end");
     for _ in 0..100 {
         ui.key(up);
     }
@@ -361,41 +360,37 @@ fn long_errors_are_scrolled_and_stop_at_their_ends() {
 }
 
 #[test]
-fn work_that_failed_is_said_in_the_pane() {
+fn failed_work_is_shown_in_the_pane() {
     let mut ui = TestUi::new();
-    let failure = Failure::Work("cannot write /nowhere/a.png: no such folder".to_owned());
+    let failure = Failure::Work("unwritable".to_owned());
     ui.worker(protocol::Event::Failed { generation: 1, failure });
-    assert!(ui.text().contains("error: cannot write /nowhere/a.png"), "{}", ui.text());
+    assert!(ui.text().contains("error: unwritable"), "{}", ui.text());
 }
 
 #[test]
-fn a_conflict_opens_the_pane_once_and_stays_until_it_is_solved() {
+fn conflict_opens_the_pane_once() {
     let mut ui = TestUi::new();
-    let conflict = || vec![diagnostic(Severity::Error, "cannot write a.png")];
+    let conflict = || vec![diagnostic(Severity::Error, "readonly a.png")];
     let refused = || protocol::Event::Refused { generation: 1, conflicts: conflict() };
     ui.worker(refused());
-    assert!(
-        ui.text().contains("error: cannot write a.png") && ui.text().contains("1 error"),
-        "{}",
-        ui.text()
-    );
-    assert!(ui.text().contains("nothing is written"));
-    assert!(ui.state.work.is_running(), "the render goes on");
+    assert!(ui.text().contains("error: readonly") && ui.text().contains("1 error"), "{}", ui.text());
+    assert!(ui.state.saving.unwritten.is_some() && ui.text().contains(messages::NOT_WRITTEN));
+    assert!(ui.state.work.is_running(), "the render continues");
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-    assert!(!ui.text().contains("cannot write a.png"));
+    assert!(!ui.text().contains("readonly a.png"));
     ui.worker(refused());
-    assert!(!ui.text().contains("cannot write a.png"), "a person has seen and closed it");
+    assert!(!ui.text().contains("readonly a.png"), "the user closed it");
     let warning = diagnostic(Severity::Warning, "texture `b` is not used");
     ui.worker(done(1, [conflict(), vec![warning]].concat(), false));
     assert!(ui.text().contains("e 1 error, 1 warning"), "{}", ui.text());
     ui.press('e');
-    assert!(ui.text().contains("cannot write a.png"));
+    assert!(ui.text().contains("readonly a.png"));
     ui.worker(done(1, Vec::new(), false));
     assert!(!ui.text().contains("error"), "{}", ui.text());
 }
 
 #[test]
-fn names_with_escape_sequences_come_out_harmless() {
+fn escape_sequences_in_names_are_harmless() {
     let evil = "a\u{1b}]52;c;eA==\u{7}\u{9b}31m\u{202e}b\rc";
     let mut ui = TestUi::new();
     ui.state.request.scene = evil.into();
@@ -468,29 +463,29 @@ proptest! {
 }
 
 #[test]
-fn a_picture_that_could_not_be_written_is_not_called_done() {
+fn unwritten_image_is_not_done() {
     let mut ui = TestUi::new();
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::WriteFailed {
         generation,
         path: None,
-        message: "cannot write a.png: disk full".to_owned(),
+        message: "a.png: disk full".to_owned(),
     });
     ui.worker(done(generation, Vec::new(), false));
     let first = |ui: &mut TestUi| ui.text().lines().next().map(str::to_owned).unwrap_or_default();
     assert!(first(&mut ui).contains("! unwritten") && !ui.text().contains("✓ done"), "{}", ui.text());
     ui.press('y');
-    assert!(ui.text().contains("not written: e says why"), "{}", ui.text());
+    assert!(ui.text().contains(messages::NOT_WRITTEN), "{}", ui.text());
     // `e` shows the reason again.
     ui.press('e');
-    assert!(ui.text().contains("─ 1 error ─") && ui.text().contains("error: cannot write a.png: disk full"));
+    assert!(ui.text().contains("─ 1 error ─") && ui.text().contains("error: a.png"));
     ui.press('e');
     assert!(!ui.text().contains("disk full"), "{}", ui.text());
     ui.worker(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: true });
     assert!(first(&mut ui).contains("✓ done"), "{}", ui.text());
 }
 
-/// The screen behind its first line, in one line.
+/// The screen below the header, in one line.
 fn below(ui: &mut TestUi) -> String {
     let text = ui.text();
     let words = text.lines().skip(1).flat_map(str::split_whitespace);
@@ -498,7 +493,7 @@ fn below(ui: &mut TestUi) -> String {
 }
 
 #[test]
-fn a_file_of_another_picture_is_not_named() {
+fn files_of_other_images_are_not_listed() {
     for (columns, rows) in [(80, 24), (120, 40), (100, 20)] {
         let mut ui = TestUi::with(state(columns, rows));
         let written = |generation| protocol::Event::Written {
@@ -515,33 +510,33 @@ fn a_file_of_another_picture_is_not_named() {
         ui.worker(written(1));
         ui.finish(super::RED);
         assert!(below(&mut ui).contains("→ a.png"), "{}", ui.text());
-        // The next picture cannot be written: the file holds the one before.
+        // The next image cannot be written, so the file contains the previous one.
         ui.event(Event::Changed(crate::Changed { noticed: ui.now }));
         ui.worker(protocol::Event::Started { generation: 2 });
-        ui.worker(failed(2, "cannot write a.png: denied"));
+        ui.worker(failed(2, "a.png: denied"));
         ui.worker(done(2, Vec::new(), false));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         assert!(!below(&mut ui).contains("→ a.png"), "{}", ui.text());
-        // It can again.
+        // Writing works again.
         ui.press('w');
         ui.worker(written(2));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         assert!(below(&mut ui).contains("→ a.png") && !ui.text().contains("unwritten"), "{}", ui.text());
-        // Written by a key once more, it fails: nobody knows what is there.
+        // Another write requested with a key fails, so the content is unknown.
         ui.press('w');
-        ui.worker(failed(2, "cannot write a.png: gone"));
+        ui.worker(failed(2, "a.png: gone"));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         let first = ui.text().lines().next().map(str::to_owned).unwrap_or_default();
         assert!(first.contains("! unwritten") && !below(&mut ui).contains("→ a.png"), "{}", ui.text());
         ui.press('e');
-        assert!(ui.text().contains("cannot write a.png: gone"), "{}", ui.text());
-        let words = "not written: cannot write a.png: gone; before that, wrote a.png";
+        assert!(ui.text().contains("a.png: gone"), "{}", ui.text());
+        let words = "not written: a.png: gone; before that, wrote a.png";
         assert_eq!(crate::exit_summary::words(&ui.state), words);
     }
 }
 
 #[test]
-fn an_order_to_write_that_fails_while_a_render_goes_on_says_nothing_of_its_end() {
+fn failed_write_during_a_render_is_not_final() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     ui.press('w');
@@ -554,7 +549,7 @@ fn an_order_to_write_that_fails_while_a_render_goes_on_says_nothing_of_its_end()
 }
 
 #[test]
-fn the_way_back_is_offered_once_and_where_something_was_changed() {
+fn reset_is_offered_once_after_a_change() {
     let mut ui = TestUi::with(state(200, 60));
     ui.finish(RED);
     let keys = |ui: &mut TestUi| ui.text().lines().last().map(str::to_owned).unwrap_or_default();
@@ -565,19 +560,19 @@ fn the_way_back_is_offered_once_and_where_something_was_changed() {
     ui.press('l');
     ui.finish(RED);
     let keys = keys(&mut ui);
-    assert!(keys.contains("0 reset camera") && keys.matches("0 reset").count() == 1, "{keys}");
+    assert!(keys.contains("reset camera") && keys.matches("0 reset").count() == 1, "{keys}");
 }
 
 #[test]
-fn what_the_last_picture_took_is_in_words_where_there_is_room() {
+fn preview_cost_is_shown_if_there_is_room() {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
-    // All stages alike leave no room for it.
+    // With all stages there is no room for it.
     ui.state.work.stages = Default::default();
     ui.state.saving.edits = 1;
     ui.state.display.frame =
         Some(FrameReport { bytes: 30_500, round_trip: Some(Duration::from_millis(150)) });
-    assert!(ui.text().contains("31 kB sent, answered in 150 ms"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::preview_cost(31, Some(150))), "{}", ui.text());
     ui.event(Event::Resize(window(30, 20)));
     assert!(ui.text().contains("31 kB sent") && !ui.text().contains("150 ms"), "{}", ui.text());
     ui.event(Event::Resize(window(9, 20)));
@@ -585,23 +580,23 @@ fn what_the_last_picture_took_is_in_words_where_there_is_room() {
 }
 
 #[test]
-fn the_folder_stands_before_the_name() {
+fn folder_precedes_the_name() {
     let mut ui = TestUi::new();
     ui.finish(RED);
-    assert!(ui.text().contains("scenes/cornell.toml  640×480"), "{}", ui.text());
+    assert!(ui.text().contains("/cornell.toml  640×480"), "{}", ui.text());
     ui.event(Event::Resize(window(40, 12)));
     assert!(!ui.text().contains("scenes"), "{}", ui.text());
 }
 
 #[test]
-fn a_change_of_time_that_has_no_room_is_left_out() {
+fn time_changes_are_left_out_without_room() {
     let mut ui = TestUi::with(state(100, 24));
     ui.finish(RED);
     ui.state.work.last_seconds[Stage::Render as usize] = Some(4.0);
     ui.press('r');
     ui.state.work.stages[Stage::Render as usize] = Some(stage(Stage::Render, Status::Done, 0.35, ""));
     assert!(ui.text().contains("render    350 ms −3.65 s"), "{}", ui.text());
-    // The gap before the time is the first to go.
+    // The gap before the time is dropped first.
     ui.event(Event::Resize(window(80, 24)));
     assert!(ui.text().contains("✓ render 350 ms −3.65 s"), "{}", ui.text());
     ui.state.work.last_seconds[Stage::Render as usize] = Some(200.0);
@@ -610,14 +605,14 @@ fn a_change_of_time_that_has_no_room_is_left_out() {
 }
 
 #[test]
-fn a_picture_that_lacks_photons_is_said_to() {
+fn preview_without_photons_is_marked() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     ui.worker(protocol::Event::Stage {
         generation: 1,
         stage: stage(Stage::Photons, Status::Running, 0.0, ""),
     });
-    assert!(!ui.text().contains("without photons"), "there is no picture yet");
+    assert!(!ui.text().contains(messages::WITHOUT_PHOTONS), "no preview yet");
     let picture = |lacks_photons| Event::Picture {
         generation: 1,
         picture: plain_picture(50, 38, RED),
@@ -627,9 +622,9 @@ fn a_picture_that_lacks_photons_is_said_to() {
         source: None,
     };
     ui.event(picture(true));
-    assert!(ui.text().contains("shown without photons yet"), "{}", ui.text());
+    assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
     ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.1, None) });
-    assert!(ui.text().contains("shown without photons yet"), "as long as that picture is shown");
+    assert!(ui.text().contains(messages::WITHOUT_PHOTONS), "while that preview is shown");
     ui.event(picture(false));
-    assert!(!ui.text().contains("without photons"), "{}", ui.text());
+    assert!(!ui.text().contains(messages::WITHOUT_PHOTONS), "{}", ui.text());
 }

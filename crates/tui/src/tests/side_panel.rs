@@ -1,4 +1,4 @@
-//! Tests of what a wide window shows beside a picture, and of notifications.
+//! The noise curve and the history in a wide window, and notifications.
 
 use ratatui::layout::Rect;
 
@@ -8,6 +8,7 @@ use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::graphics::Protocol;
+use crate::messages;
 use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::preview_kind::PreviewKind;
@@ -16,7 +17,7 @@ use crate::terminals::{Brand, TerminalId};
 use crate::view;
 use crate::view::layout::Layout;
 
-/// A render whose noise falls from 10 % after a second, with `error` asked for.
+/// Simulates a render whose noise falls from 10 % after a second, with `error` as the target.
 fn rendered(ui: &mut TestUi, error: f32) {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -52,7 +53,7 @@ fn rendered(ui: &mut TestUi, error: f32) {
     ui.worker(event);
 }
 
-/// Saves of the scene, each with its text.
+/// Saves the scene with each of these texts.
 fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     for (text, color) in edits {
         ui.event(Event::Changed(Changed { noticed: ui.now }));
@@ -62,7 +63,7 @@ fn edited(ui: &mut TestUi, edits: &[(&str, [u8; 3])]) {
     }
 }
 
-/// The text of the panel, in one line, without the blocks of small pictures.
+/// The text of the panel in one line, without thumbnails.
 fn panel(ui: &mut TestUi) -> String {
     let panel = Layout::of(&ui.state).panel;
     let buffer = ui.screen();
@@ -75,31 +76,31 @@ fn panel(ui: &mut TestUi) -> String {
 }
 
 #[test]
-fn the_noise_of_a_finished_picture_is_a_curve() {
+fn noise_of_a_finished_render_is_a_curve() {
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.01);
     let text = panel(&mut ui);
-    assert!(text.contains("noise while it rendered"), "{}", ui.text());
-    let words = "10 % after 1.00 s, 0.95 % after 1 min 50 s; the line is the 1 % asked of each tile";
-    assert!(text.contains(words), "{text}");
-    // The line is level: a row of the same dots from the axis to the edge.
+    assert!(text.contains(messages::NOISE_OVER_TIME), "{}", ui.text());
+    let words = format!("10 % after 1.00 s, 0.95 % after 1 min 50 s; {}", messages::noise_target("1 %"));
+    assert!(text.contains(&words), "{text}");
+    // The line is level: a row of equal dots from the axis to the edge.
     let is_line = |line: &str| line.chars().filter(|c| ('⠁'..='⣿').contains(c)).count() >= 12;
     assert!(ui.text().lines().any(is_line), "{}", ui.text());
-    // Another exposure is the same render, a key that changes the light is not.
+    // Another exposure is the same render; a key that changes the light is not.
     ui.press(']');
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
-    assert!(!panel(&mut ui).contains("noise while it rendered"), "while it works");
+    assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "during the render");
     let mut event = done(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
     ui.worker(event);
-    assert!(panel(&mut ui).contains("noise while it rendered"), "{}", ui.text());
+    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
     ui.press('s');
     ui.finish(BLUE);
-    assert!(!panel(&mut ui).contains("noise while it rendered"), "one point is no curve");
-    // A picture that is found again has its curve.
+    assert!(!panel(&mut ui).contains(messages::NOISE_OVER_TIME), "one point is not a curve");
+    // An image that is found again has its curve.
     ui.press('0');
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -108,42 +109,45 @@ fn the_noise_of_a_finished_picture_is_a_curve() {
         report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
     }
     ui.worker(event);
-    assert!(panel(&mut ui).contains("noise while it rendered"), "{}", ui.text());
-    // Without an `error` there is no line.
+    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
+    // Without an `error`, there is no target line.
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.0);
-    assert!(panel(&mut ui).contains("1 min 50 s") && !panel(&mut ui).contains("the line is"));
+    assert!(panel(&mut ui).contains("1 min 50 s") && !panel(&mut ui).contains("target:"));
 }
 
 #[test]
-fn the_last_pictures_say_what_changed_and_a_click_shows_them() {
+fn history_lists_changes_and_opens_on_click() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
-    assert!(!panel(&mut ui).contains("the last pictures"));
+    assert!(!panel(&mut ui).contains(messages::HISTORY));
     edited(&mut ui, &[("camera.fov = 30", BLUE)]);
     let text = panel(&mut ui);
-    assert!(text.contains("the last pictures n N") && text.contains("▸2 camera.fov"), "{text}");
-    assert!(text.contains("1 first"), "{text}");
+    assert!(
+        text.contains(&format!("{} (n / N)", messages::HISTORY)) && text.contains("▸2 camera.fov"),
+        "{text}"
+    );
+    assert!(text.contains(&format!("1 {}", messages::OPENED)), "{text}");
     ui.press('s');
     ui.finish(RED);
     assert!(panel(&mut ui).contains("▸3 shadows hard"), "{}", ui.text());
     let all = cells_of(&mut ui, BLUE);
-    assert!(all > 5 && all < 100, "a small picture: {all}");
-    // The cell of the blue one.
+    assert!(all > 5 && all < 100, "a thumbnail: {all}");
+    // The cell of the blue thumbnail.
     let buffer = ui.screen();
     let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
     let places = buffer.area.positions();
-    let place = places.into_iter().find(|place| buffer[*place].fg == blue).expect("a small picture");
+    let place = places.into_iter().find(|place| buffer[*place].fg == blue).expect("a thumbnail");
     let mouse = Mouse { kind: MouseKind::Press, column: place.x, row: place.y };
     ui.event(Event::Mouse(mouse));
     ui.event(Event::Mouse(Mouse { kind: MouseKind::Release, ..mouse }));
     assert!(cells_of(&mut ui, BLUE) > 500, "{}", ui.text());
-    assert!(ui.text().contains("picture 2 of 3") && panel(&mut ui).contains("▸2"), "{}", ui.text());
+    assert!(ui.text().contains(&messages::render_of(2, 3)) && panel(&mut ui).contains("▸2"), "{}", ui.text());
     ui.press('N');
     assert!(panel(&mut ui).contains("▸3") && cells_of(&mut ui, RED) > 500);
 }
 
-/// A save of the scene whose render has begun and has shown a picture, if it has a color.
+/// Saves the scene and starts its render, which shows a preview if there is a color.
 fn begun(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
@@ -154,7 +158,7 @@ fn begun(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
     color.into_iter().for_each(|color| show(ui, color));
 }
 
-/// The request under way has a picture, which the terminal gets.
+/// Shows a preview of the current request on the terminal.
 fn show(ui: &mut TestUi, color: [u8; 3]) {
     let (generation, picture) = (ui.state.request.generation, plain_picture(50, 38, color));
     let picture = Event::Picture {
@@ -166,12 +170,12 @@ fn show(ui: &mut TestUi, color: [u8; 3]) {
         source: None,
     };
     ui.event(picture);
-    // The line has taken its first bytes.
+    // Its first bytes have been sent.
     ui.event(Event::Shown { generation });
 }
 
 #[test]
-fn the_picture_does_not_wait_for_its_entry_in_the_strip() {
+fn preview_does_not_wait_for_the_history() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     begun(&mut ui, "camera.fov = 30", None);
@@ -190,36 +194,36 @@ fn the_picture_does_not_wait_for_its_entry_in_the_strip() {
     ui.state.dirty = false;
     ui.event(Event::Shown { generation });
     assert_eq!(ui.state.picture.history.len(), before + 1);
-    assert!(ui.state.dirty, "the strip has a new entry");
+    assert!(ui.state.dirty, "the history has a new entry");
 }
 
-/// Color of the newest entry's small picture.
+/// Color of the newest thumbnail.
 fn small_color(ui: &TestUi) -> [u8; 3] {
     let history = &ui.state.picture.history;
-    history.small(history.len() - 1).expect("a small picture").pixels[0]
+    history.small(history.len() - 1).expect("a thumbnail").pixels[0]
 }
 
 #[test]
-fn the_entry_gets_the_picture_that_comes_after_the_end() {
+fn entry_gets_the_preview_after_the_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     begun(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
-    // The last picture is taken from its slot when the line has room for it.
+    // The last preview is taken from its slot when there is bandwidth for it.
     ui.worker(done(generation, Vec::new(), false));
     ui.screen();
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
-    assert!(ui.state.dirty, "the strip is drawn again");
+    assert!(ui.state.dirty, "the history is redrawn");
     assert!(panel(&mut ui).contains("▸2 camera.fov 40 → 30"), "{}", ui.text());
     assert_eq!(ui.state.picture.history.len(), 2);
-    // Nothing is drawn for a picture that is shown already.
+    // A preview that is shown already is not redrawn.
     ui.event(Event::Shown { generation });
     assert!(!ui.state.dirty);
 }
 
 #[test]
-fn the_entry_gets_the_picture_that_comes_after_the_end_while_an_older_one_is_looked_at() {
+fn hidden_entry_gets_the_preview_after_the_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     begun(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
@@ -229,11 +233,11 @@ fn the_entry_gets_the_picture_that_comes_after_the_end_while_an_older_one_is_loo
     ui.screen();
     show(&mut ui, BLUE);
     assert_eq!(small_color(&ui), BLUE);
-    assert!(ui.state.dirty, "the strip is drawn again");
+    assert!(ui.state.dirty, "the history is redrawn");
 }
 
 #[test]
-fn pixels_one_to_one_are_no_small_picture() {
+fn actual_pixels_are_not_a_thumbnail() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED), ("camera.fov = 30", BLUE)]);
     let (generation, picture) = (ui.state.request.generation, plain_picture(50, 38, RED));
@@ -245,26 +249,33 @@ fn pixels_one_to_one_are_no_small_picture() {
 }
 
 #[test]
-fn the_render_under_way_is_the_newest_of_the_last_pictures() {
+fn running_render_is_the_newest_entry() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     begun(&mut ui, "camera.fov = 30", Some(BLUE));
     let text = panel(&mut ui);
-    assert!(text.contains("▸2 camera.fov 40 → 30") && text.contains(" 1 first"), "{text}");
-    assert!(!text.contains("unfinished"), "it is not stopped: {text}");
-    // The next save stops it. The stopped picture stays until the new render has one; it has no number.
+    assert!(
+        text.contains("▸2 camera.fov 40 → 30") && text.contains(&format!(" 1 {}", messages::OPENED)),
+        "{text}"
+    );
+    assert!(!text.contains(messages::STOPPED), "not stopped: {text}");
+    // The next save stops it. The stopped render stays without a number until the new one has a preview.
     begun(&mut ui, "camera.fov = 20", None);
     let text = panel(&mut ui);
-    assert!(text.contains("▸– unfinished; camera.fov") && !text.contains('2'), "{text}");
+    assert!(text.contains(&format!("▸– {}: camera.fov", messages::STOPPED)) && !text.contains('2'), "{text}");
     show(&mut ui, [10, 200, 20]);
     for keys in ["", "nN", "b", "b"] {
         keys.chars().for_each(|key| drop(ui.press(key)));
         let text = panel(&mut ui);
-        assert!(text.contains("2 camera.fov 30 → 20") && text.contains("– unfinished; camera.fov"), "{text}");
+        assert!(
+            text.contains("2 camera.fov 30 → 20")
+                && text.contains(&format!("– {}: camera.fov", messages::STOPPED)),
+            "{text}"
+        );
         assert_eq!(text.contains('▸'), text.contains("▸2") || keys == "b", "{keys}: {text}");
-        assert_eq!(text.matches("unfinished").count(), 1, "{text}");
+        assert_eq!(text.matches(messages::STOPPED).count(), 1, "{text}");
     }
-    // While an older one is looked at, the one under way is there as well.
+    // The running render is added even while an older one is shown.
     edited(&mut ui, &[]);
     let generation = ui.state.request.generation;
     ui.worker(done(generation, Vec::new(), false));
@@ -279,23 +290,26 @@ fn the_render_under_way_is_the_newest_of_the_last_pictures() {
 }
 
 #[test]
-fn a_camera_on_its_way_is_one_of_the_last_pictures() {
+fn moving_camera_is_one_entry() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
     for step in 0..5 {
         ui.press('l');
         show(&mut ui, [step, 0, 200]);
         let text = panel(&mut ui);
-        assert!(text.contains("▸2 camera moved") && text.contains(" 1 first"), "{text}");
+        assert!(
+            text.contains("▸2 camera moved") && text.contains(&format!(" 1 {}", messages::OPENED)),
+            "{text}"
+        );
         assert_eq!(ui.state.picture.history.len(), 2, "{text}");
     }
 }
 
 #[test]
-fn a_picture_that_is_as_it_was_keeps_its_curve() {
+fn unchanged_image_keeps_its_curve() {
     let mut ui = TestUi::with(state(120, 40));
     rendered(&mut ui, 0.01);
-    // A typo, which is mended: the picture is unchanged.
+    // A typo that is fixed again: the image is unchanged.
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
     ui.event(Event::Settled);
@@ -308,11 +322,11 @@ fn a_picture_that_is_as_it_was_keeps_its_curve() {
     }
     ui.worker(event);
     assert!(ui.text().contains("unchanged"), "{}", ui.text());
-    assert!(panel(&mut ui).contains("noise while it rendered"), "{}", ui.text());
+    assert!(panel(&mut ui).contains(messages::NOISE_OVER_TIME), "{}", ui.text());
 }
 
 #[test]
-fn no_line_ends_between_a_number_and_its_unit() {
+fn numbers_stay_with_their_units() {
     for columns in 120..200 {
         let mut ui = TestUi::with(state(columns, 40));
         rendered(&mut ui, 0.01);
@@ -330,8 +344,8 @@ fn no_line_ends_between_a_number_and_its_unit() {
 }
 
 #[test]
-fn errors_over_the_strip_leave_no_heading_behind() {
-    // A panel too narrow for errors, one too low for them, and one that holds them.
+fn diagnostics_do_not_cover_only_the_heading() {
+    // A panel too narrow for diagnostics, one too low for them, and one that holds them.
     for (width, height) in [(640, 400), (640, 320), (640, 480)] {
         let mut ui = TestUi::with(state(200, 60));
         ui.state.request.effective = Some(Effective { width, height, ..settings() });
@@ -349,9 +363,12 @@ fn errors_over_the_strip_leave_no_heading_behind() {
             ui.worker(event);
         }
         let entries = |text: &str| {
-            ["1 first", "2 seed", "3 seed"].into_iter().filter(|words| text.contains(words)).count()
+            [&*format!("1 {}", messages::OPENED), "2 seed", "3 seed"]
+                .into_iter()
+                .filter(|words| text.contains(words))
+                .count()
         };
-        let has_heading = |text: &str| text.contains("the last pictures");
+        let has_heading = |text: &str| text.contains(messages::HISTORY);
         let text = ui.text();
         assert!(has_heading(&text) && entries(&text) == 3, "{text}");
         for count in 1..8 {
@@ -366,9 +383,9 @@ fn errors_over_the_strip_leave_no_heading_behind() {
     }
 }
 
-/// Whatever the window, the colors and the kind of picture: all is in the panel, and what waits for the picture is not in it.
+/// In every window and with every kind of preview, delayed text is inside the panel.
 #[test]
-fn it_fits_into_every_window() {
+fn side_panel_fits_into_every_window() {
     let kinds = [
         (PreviewKind::HalfBlock, ColorDepth::TrueColor),
         (PreviewKind::Octant, ColorDepth::Indexed256),
@@ -406,7 +423,7 @@ fn it_fits_into_every_window() {
                     assert!(drawn.later.intersection(layout.preview).is_empty(), "{columns}×{rows}");
                     let is_wide = columns >= 120;
                     assert!(
-                        is_wide || !fixtures_text(&buffer).contains("the last pictures"),
+                        is_wide || !fixtures_text(&buffer).contains(messages::HISTORY),
                         "{columns}×{rows}"
                     );
                 }
@@ -420,7 +437,7 @@ fn fixtures_text(buffer: &ratatui::buffer::Buffer) -> String {
 }
 
 #[test]
-fn what_is_written_is_a_link() {
+fn written_files_are_hyperlinks() {
     for (columns, rows) in [(120, 40), (80, 20)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.worker(protocol::Event::Written {
@@ -436,11 +453,11 @@ fn what_is_written_is_a_link() {
         let name: String = cells.positions().map(|place| buffer[place].symbol().to_owned()).collect();
         assert_eq!((name.as_str(), path.as_os_str().to_str()), ("cornell.png", Some("cornell.png")));
         ui.press('?');
-        assert!(view::draw(&ui.state, &mut buffer).files.is_empty(), "the help lies over it");
+        assert!(view::draw(&ui.state, &mut buffer).files.is_empty(), "covered by the help");
     }
 }
 
-/// Ends a render after so many seconds. Returns what is sent beside the picture.
+/// Ends a render after this many seconds. Returns what is sent after the preview.
 fn told(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
     ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
@@ -454,7 +471,7 @@ fn told(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
 }
 
 #[test]
-fn the_end_of_a_long_render_is_told_to_whoever_looks_elsewhere() {
+fn end_of_a_long_render_is_notified() {
     let focus = |is_here| {
         move |ui: &mut TestUi| drop(ui.event(Event::TerminalReply(TerminalReply::Focus { is_here })))
     };
@@ -462,9 +479,9 @@ fn the_end_of_a_long_render_is_told_to_whoever_looks_elsewhere() {
     assert_eq!(told(31, focus(false)).as_deref(), Some(words));
     assert_eq!(told(30, focus(false)), None);
     assert_eq!(told(31, focus(true)), None);
-    assert_eq!(told(31, |_| {}), None, "a terminal that never said that it lost the focus");
+    assert_eq!(told(31, |_| {}), None, "the terminal never reported a loss of focus");
     assert_eq!(told(31, |ui| ui.state.display.has_focus = true), None);
-    // A pause is no work.
+    // A pause does not count.
     let held = |ui: &mut TestUi| {
         focus(false)(ui);
         ui.key(KeyPress::plain(' '));

@@ -1,20 +1,21 @@
-//! Tests of warnings: likely mistakes are counted and shown.
+//! Warnings.
 
 use crate::Changed;
 use crate::event::{Event, KeyPress};
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol;
 use crate::scene::diagnostic::Severity;
 
 #[test]
 fn warnings_are_counted_and_shown_on_demand() {
     let mut ui = TestUi::new();
-    ui.worker(done(1, vec![diagnostic(Severity::Warning, "texture `b` is not used")], false));
-    assert!(ui.text().contains("1 warning") && !ui.text().contains("not used"));
+    ui.worker(done(1, vec![diagnostic(Severity::Warning, "unused `b`")], false));
+    assert!(ui.text().contains("1 warning") && !ui.text().contains("unused"));
     ui.press('e');
-    assert!(ui.text().contains("warning: texture `b` is not used"));
+    assert!(ui.text().contains("warning: unused `b`"));
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-    assert!(!ui.text().contains("not used"));
+    assert!(!ui.text().contains("unused"));
 }
 
 #[test]
@@ -29,26 +30,26 @@ fn warnings_are_counted_in_one_place() {
 }
 
 #[test]
-fn warnings_are_there_while_the_picture_is_rendered() {
+fn warnings_are_shown_during_the_render() {
     let mut ui = TestUi::new();
     ui.worker(protocol::Event::Started { generation: 1 });
     ui.press('e');
-    assert!(ui.text().contains("files are still being read"), "{}", ui.text());
-    let warnings = vec![diagnostic(Severity::Warning, "texture `b` is not used")];
+    assert!(ui.text().contains(messages::STILL_READING), "{}", ui.text());
+    let warnings = vec![diagnostic(Severity::Warning, "unused `b`")];
     ui.worker(protocol::Event::Warnings { generation: 1, warnings });
     ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
     assert!(ui.text().contains("1 warning"), "{}", ui.text());
     ui.press('e');
-    assert!(ui.text().contains("warning: texture `b` is not used"), "{}", ui.text());
+    assert!(ui.text().contains("warning: unused `b`"), "{}", ui.text());
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.worker(protocol::Event::Warnings { generation: 2, warnings: Vec::new() });
-    assert!(!ui.text().contains("not used"), "the scene has none any more: {}", ui.text());
+    assert!(!ui.text().contains("unused"), "no warnings left: {}", ui.text());
     ui.press('e');
-    assert!(ui.text().contains("no errors and no warnings"), "{}", ui.text());
+    assert!(ui.text().contains(messages::NO_DIAGNOSTICS), "{}", ui.text());
 }
 
 #[test]
-fn warnings_below_errors_are_counted_with_them() {
+fn warnings_are_counted_with_errors() {
     let mut ui = TestUi::new();
     ui.fail(vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")]);
     ui.event(Event::Settled);

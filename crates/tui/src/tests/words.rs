@@ -1,4 +1,4 @@
-//! Tests of words that a newcomer stumbled over.
+//! Wording that confused new users.
 
 use crossterm::event::KeyCode;
 
@@ -7,6 +7,7 @@ use crate::color::ColorDepth;
 use crate::event::{Event, KeyPress};
 use crate::exit_summary;
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol::{self, CheckpointNews, Picked, Stage, Status};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
@@ -17,65 +18,66 @@ fn last_line(ui: &mut TestUi) -> String {
 }
 
 #[test]
-fn a_click_is_answered_while_warnings_are_open() {
+fn click_is_answered_while_warnings_are_open() {
     let mut ui = TestUi::with(state(140, 40));
     ui.finish(RED);
     ui.worker(done(1, vec![diagnostic(Severity::Warning, "a warning")], false));
     ui.press('e');
     let picked = Picked { pixel: [3, 4], thing: None, color: None };
     ui.worker(protocol::Event::Picked { generation: 1, picked: Box::new(picked) });
-    assert!(ui.text().contains("nothing at pixel 3, 4"), "{}", ui.text());
+    assert!(ui.text().contains("pixel 3, 4"), "{}", ui.text());
 }
 
 #[test]
-fn one_key_takes_back_all_that_keys_have_changed_and_says_so_once() {
+fn reset_lists_all_changes_once() {
     let mut ui = TestUi::with(state(200, 40));
     ui.finish(RED);
     ui.state.request.toggles.camera.focus = Some(2.0);
     ui.press(']');
     ui.finish(BLUE);
     ui.key(KeyPress::special(KeyCode::Esc));
-    assert!(last_line(&mut ui).contains("0 reset focus, exposure (+0.25)"), "{}", ui.text());
+    assert_eq!(ui.state.request.changes(), ["focus", "exposure (+0.25)"]);
+    assert!(last_line(&mut ui).contains("reset focus, "), "{}", ui.text());
     ui.press('l');
     ui.finish(RED);
     ui.key(KeyPress::special(KeyCode::Esc));
     let keys = last_line(&mut ui);
-    assert!(keys.contains("0 reset camera, exposure (+0.25)") && !keys.contains("focus"), "{keys}");
+    assert!(keys.contains("reset camera, ") && !keys.contains("focus"), "{keys}");
     ui.press('[');
     assert!(ui.text().contains("exposure 0 "), "{}", ui.text());
 }
 
 #[test]
-fn a_view_of_photons_without_photons_says_how_to_get_them() {
+fn photon_view_without_photons_has_a_hint() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     for key in ['v', '/'].into_iter().chain("photons".chars()) {
         ui.press(key);
     }
-    assert!(ui.text().contains("p turns them on"), "{}", ui.text());
+    assert!(ui.text().contains(messages::VIEW_WITHOUT_PHOTONS), "{}", ui.text());
 }
 
 #[test]
-fn without_a_preview_no_key_of_the_picture_is_offered() {
+fn image_keys_are_hidden_without_a_preview() {
     let kind = |kind| TestUi::with(state_with(200, 24, kind, ColorDepth::TrueColor, Overrides::default()));
     for (mut ui, is_offered) in [(kind(PreviewKind::None), false), (kind(PreviewKind::HalfBlock), true)] {
         ui.finish(RED);
-        assert_eq!(last_line(&mut ui).contains("tab picture"), is_offered, "{}", ui.text());
+        assert_eq!(last_line(&mut ui).contains("tab image"), is_offered, "{}", ui.text());
     }
 }
 
 #[test]
-fn what_a_render_goes_on_from_is_no_news_once_it_is_done() {
+fn resume_message_disappears_at_the_end() {
     let mut ui = TestUi::new();
     let news = CheckpointNews::Resumed { path: "cornell.png.checkpoint".into(), samples: 16 };
     ui.worker(protocol::Event::Checkpoint { generation: 1, news });
-    assert!(ui.text().contains("resuming from cornell.png.checkpoint"), "{}", ui.text());
+    assert!(ui.text().contains(messages::RESUMING), "{}", ui.text());
     ui.finish(RED);
-    assert!(!ui.text().contains("resuming from"), "{}", ui.text());
+    assert!(!ui.text().contains(messages::RESUMING), "{}", ui.text());
 }
 
 #[test]
-fn what_was_never_rendered_is_not_rendered_again() {
+fn first_render_is_not_called_again() {
     let mut ui = TestUi::with(state(120, 40));
     ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(!ui.text().contains("render again"), "{}", ui.text());
@@ -85,7 +87,7 @@ fn what_was_never_rendered_is_not_rendered_again() {
 }
 
 #[test]
-fn the_name_has_room_in_every_small_window() {
+fn name_has_room_in_every_small_window() {
     for columns in 26..60 {
         let mut ui = TestUi::with(state(columns, 8));
         ui.finish(RED);
@@ -94,34 +96,35 @@ fn the_name_has_room_in_every_small_window() {
 }
 
 #[test]
-fn a_reason_that_has_room_beside_its_stage_is_not_broken() {
+fn reason_beside_its_stage_is_not_wrapped() {
     let mut ui = TestUi::with(state(200, 60));
     ui.finish(RED);
     ui.press('r');
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
-    let stage = stage(Stage::Meshes, Status::Skipped, 0.0, "the scene has no mesh");
+    let stage = stage(Stage::Meshes, Status::Skipped, 0.0, "unneeded");
     ui.worker(protocol::Event::Stage { generation, stage });
     ui.event(Event::Tick);
-    assert!(ui.text().contains("skipped  the scene has no mesh"), "{}", ui.text());
+    assert!(ui.text().contains("skipped  unneeded"), "{}", ui.text());
 }
 
-/// It would float at the right of an empty screen.
+/// Otherwise it would float at the right of an empty screen.
 #[test]
-fn the_hint_about_a_broken_scene_is_whole_and_in_its_line() {
+fn save_hint_is_complete_on_its_line() {
     for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
         let mut ui = TestUi::with(state(columns, rows));
         ui.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         ui.event(Event::Settled);
         let text = ui.text();
-        let lines: Vec<&str> = text.lines().filter(|line| line.contains("save cornell.toml")).collect();
+        let hint = messages::save_to_render("cornell.toml", false);
+        let lines: Vec<&str> = text.lines().filter(|line| line.contains(&hint)).collect();
         assert_eq!(lines.len(), 1, "{text}");
-        assert_eq!(lines[0].trim_end(), "save cornell.toml to render", "{text}");
+        assert_eq!(lines[0].trim_end(), hint, "{text}");
     }
 }
 
 #[test]
-fn nobody_is_asked_to_save_a_model() {
+fn models_have_no_save_hint() {
     let mut state = state(120, 40);
     state.request.scene = "toy.glb".into();
     let mut ui = TestUi::with(state);
@@ -129,5 +132,5 @@ fn nobody_is_asked_to_save_a_model() {
     let text = ui.text();
     assert!(text.contains("toy.glb") && !text.contains("save "), "{text}");
     let words: Vec<&str> = text.split_whitespace().filter(|word| !word.contains('▀')).collect();
-    assert!(words.join(" ").contains("rendered again when toy.glb changes"), "{text}");
+    assert!(words.join(" ").contains(&messages::renders_on_changes("toy.glb")), "{text}");
 }

@@ -3,8 +3,8 @@
 
 use std::path::PathBuf;
 
+use super::notices::{notify, prompt, say};
 use super::request::render;
-use super::say::{notify, prompt, say};
 use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
 use crate::messages;
@@ -27,7 +27,7 @@ const ROUNDING: f64 = 0.015;
 /// Stops per exposure step.
 const STOPS: f32 = 0.25;
 /// Exposure limit in stops, in both directions.
-const MOST_STOPS: f32 = 20.0;
+const MAX_STOPS: f32 = 20.0;
 
 /// Orbits by a number of steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
@@ -59,7 +59,7 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
         return notify(state, &messages::field_limit(fov));
     }
     state.request.toggles.camera.fov = Some(fov);
-    step_of_camera(state)
+    camera_step(state)
 }
 
 /// Raises the exposure by a number of steps.
@@ -67,7 +67,7 @@ pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(scene) = state.request.exposure else { return unknown(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
-    let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
+    let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
         return notify(state, &messages::exposure_limit(&signed_stops(stops)));
     }
@@ -80,15 +80,15 @@ pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
 fn moved(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     state.request.toggles.camera.pose = Some(how(&view.pose));
-    step_of_camera(state)
+    camera_step(state)
 }
 
 fn unknown(state: &mut State) -> Vec<Effect> {
     notify(state, messages::NO_SCENE)
 }
 
-pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
-    forget_own(state);
+pub(super) fn camera_step(state: &mut State) -> Vec<Effect> {
+    drop_restored_values(state);
     let effects = step(state);
     say(
         state,
@@ -98,7 +98,7 @@ pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
 }
 
 /// Drops changes that restore the scene's own values.
-fn forget_own(state: &mut State) {
+fn drop_restored_values(state: &mut State) {
     let Some(own) = state.request.camera else { return };
     let camera = &mut state.request.toggles.camera;
     camera.pose = camera.pose.filter(|pose| *pose != own.pose);
@@ -204,6 +204,6 @@ fn step(state: &mut State) -> Vec<Effect> {
 }
 
 /// Renders a waiting step if the previous one has a preview.
-pub(super) fn keep_up(state: &mut State) -> Vec<Effect> {
+pub(super) fn render_waiting_step(state: &mut State) -> Vec<Effect> {
     if state.request.camera_step.is_waiting && !state.awaits_step() { step(state) } else { Vec::new() }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::say::{notify, say, say_until_key};
+use super::notices::{notify, say, say_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::state::{Rendering, State};
@@ -35,7 +35,7 @@ pub(super) fn record_newest(state: &mut State) {
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);
     let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
-    if state.picture.history.leads_to_newest(steps) {
+    if state.picture.history.returns_to_newest(steps) {
         return close(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.step(steps, newest) {
@@ -64,7 +64,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
     }
     record(state);
     let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
-    match state.picture.history.before_edit(newest) {
+    match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
             let effects = look_at(state, shown);
             let edits = state.picture.history.edits_since_open();

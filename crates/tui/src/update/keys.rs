@@ -2,10 +2,10 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
+use super::notices::{notify, say};
 use super::request::{render, resized_preview};
-use super::say::{notify, say};
 use super::views::choose_view;
-use super::{camera, history, overlay, places, pointer, rectangle};
+use super::{camera, edit_position, history, overlay, pointer, region};
 use crate::ExitStatus;
 use crate::action::Action;
 use crate::choice::Choice;
@@ -30,8 +30,8 @@ pub(super) fn update(state: &mut State, key: KeyPress) -> Vec<Effect> {
     };
     state.dirty |= state.overlays.message.take().is_some() | state.selection.facts.take().is_some();
     state.selection.is_focusing &= action == Action::Focus;
-    if action != Action::RectangleFirst {
-        rectangle::leave(state);
+    if action != Action::RenderRegionFirst {
+        region::leave(state);
     }
     act(state, action)
 }
@@ -46,7 +46,7 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::PreviousView => step_view(state, View::ALL.len() - 1),
         Action::TogglePause => toggle_pause(state),
         Action::RenderAgain => render(state, true),
-        Action::WriteNow => write_now(state),
+        Action::WriteImage => write_now(state),
         Action::OrbitLeft => camera::orbit(state, -1.0, 0.0),
         Action::OrbitRight => camera::orbit(state, 1.0, 0.0),
         Action::OrbitUp => camera::orbit(state, 0.0, 1.0),
@@ -62,20 +62,20 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::Inspect => pointer::inspect(state),
         Action::Copy => pointer::copy(state),
         Action::Focus => pointer::focus(state),
-        Action::CloseUp => close_up(state),
-        Action::RectangleFirst => rectangle::press(state),
+        Action::ActualPixels => close_up(state),
+        Action::RenderRegionFirst => region::press(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit if is_mesh(&state.request.scene) => notify(state, messages::NO_EDITOR_FOR_MODELS),
-        Action::Edit => vec![Effect::Edit(places::to_edit(state))],
-        Action::BeforeAfter => history::before_and_after(state),
-        Action::OlderPicture => history::browse(state, 1),
-        Action::NewerPicture => history::browse(state, -1),
-        Action::SceneSettings => scene_settings(state),
+        Action::Edit => vec![Effect::Edit(edit_position::to_edit(state))],
+        Action::CompareLastEdit => history::before_and_after(state),
+        Action::OlderRender => history::browse(state, 1),
+        Action::NewerRender => history::browse(state, -1),
+        Action::ResetSettings => scene_settings(state),
         Action::ToggleDiagnostics => toggle_diagnostics(state),
         Action::ToggleHelp => change(state, |state| {
             state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
         }),
-        Action::PictureAlone => picture_alone(state),
+        Action::ShowImageOnly => picture_alone(state),
         Action::Redraw => vec![Effect::Redraw],
         Action::Suspend => vec![Effect::StopJob],
         Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],

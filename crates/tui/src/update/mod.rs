@@ -1,23 +1,23 @@
 //! The update function: state and event in, effects out. It has no side effects.
 
 mod camera;
+mod edit_position;
 mod history;
 mod keys;
+mod notices;
 mod overlay;
-mod places;
 mod pointer;
-mod rectangle;
+mod region;
 mod replies;
 mod request;
-mod say;
 mod views;
 mod worker;
 
 use std::time::{Duration, Instant};
 
+pub(super) use self::notices::say;
+use self::notices::say_until_key;
 use self::request::{render, resized_preview};
-pub(super) use self::say::say;
-use self::say::say_until_key;
 use super::ExitStatus;
 use super::event::{Effect, Event, EventSource, Signal, Window};
 use super::history::ShownImage;
@@ -41,8 +41,8 @@ pub(super) fn start(state: &mut State) -> Vec<Effect> {
 pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effect> {
     state.now = now;
     let was_paused = state.work.paused;
-    let mut effects = happened(state, event);
-    effects.extend(camera::keep_up(state));
+    let mut effects = handle(state, event);
+    effects.extend(camera::render_waiting_step(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
         let message = state.overlays.message.take();
@@ -52,13 +52,13 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     effects
 }
 
-fn happened(state: &mut State, event: Event) -> Vec<Effect> {
+fn handle(state: &mut State, event: Event) -> Vec<Effect> {
     match event {
         Event::Key(key) => keys::update(state, key),
         Event::Mouse(mouse) => pointer::update(state, mouse),
         // Pasted text has no meaning. The event loop handles the others.
         Event::Paste | Event::Written { .. } | Event::Unwritable(_) => Vec::new(),
-        Event::TerminalReply(answer) => replies::learn(state, answer),
+        Event::TerminalReply(answer) => replies::handle_reply(state, answer),
         Event::Frame(report) => {
             state.dirty |= state.display.frame != Some(report);
             state.display.frame = Some(report);
@@ -126,15 +126,15 @@ fn show(state: &mut State, shown: ShownImage) -> Vec<Effect> {
         && is_whole(&shown.picture)
         && state.display.kind != PreviewKind::None
     {
-        if state.picture.history.holds_back(&shown) {
+        if state.picture.history.hides_newer(&shown) {
             history::record_newest(state);
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let is_its = |last: &ShownImage| last.generation == shown.generation || last.is_of_same_image(&shown);
+        let is_its = |last: &ShownImage| last.generation == shown.generation || last.shows_same_image(&shown);
         let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
-            Some(last) if state.display.mixes_colors() => steadied(shown, &last),
+            Some(last) if state.display.mixes_colors() => with_stable_colors(shown, &last),
             Some(_) | None => shown,
         });
         state.dirty = true;
@@ -144,13 +144,13 @@ fn show(state: &mut State, shown: ShownImage) -> Vec<Effect> {
 
 /// Keeps the colors of pixels that differ from the last preview by at most one code. With dithering, such a
 /// difference could change the pattern.
-fn steadied(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
-    const HARDLY: u8 = 1;
+fn with_stable_colors(mut shown: ShownImage, last: &ShownImage) -> ShownImage {
+    const MAX_DIFFERENCE: u8 = 1;
     let what = |shown: &ShownImage| (shown.picture.width, shown.picture.height, shown.section);
     if what(&shown) == what(last) {
         let mut picture = (*shown.picture).clone();
         for (new, old) in picture.pixels.iter_mut().zip(&last.picture.pixels) {
-            if new.iter().zip(old).all(|(new, old)| new.abs_diff(*old) <= HARDLY) {
+            if new.iter().zip(old).all(|(new, old)| new.abs_diff(*old) <= MAX_DIFFERENCE) {
                 *new = *old;
             }
         }
@@ -191,7 +191,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     let is_over = |message: &mut Message| message.until.is_some_and(|until| now >= until);
     state.dirty |= state.overlays.message.take_if(is_over).is_some();
     if state.display.pixels_until.is_some_and(|until| now >= until) {
-        replies::lack_pixels(state);
+        replies::report_missing_pixels(state);
     }
     if state.request.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();

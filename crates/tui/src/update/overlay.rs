@@ -3,7 +3,7 @@
 use crossterm::event::KeyCode;
 
 use super::views::{self, choose_view};
-use super::{history, rectangle};
+use super::{history, region};
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap::{self, OverlayAction};
@@ -64,7 +64,7 @@ fn close(state: &mut State) -> bool {
         true
     } else if state.selection.is_focusing || state.selection.is_marking {
         (state.selection.is_focusing, state.overlays.message) = (false, None);
-        rectangle::leave(state);
+        region::leave(state);
         true
     } else if state.selection.facts.take().is_some() {
         true

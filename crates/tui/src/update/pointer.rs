@@ -1,7 +1,7 @@
 //! The mouse and queries about a position in the image.
 
-use super::say::{notify, prompt, say};
-use super::{camera, history, overlay, rectangle};
+use super::notices::{notify, prompt, say};
+use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, Mouse, MouseKind};
 use crate::keymap::OverlayAction;
@@ -35,7 +35,7 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
         MouseKind::Drag => drag(state, mouse),
         MouseKind::Release if state.selection.is_marking && state.selection.press.take().is_some() => {
             let spot = spot_at(state, mouse.column, mouse.row);
-            rectangle::release(state, spot)
+            region::release(state, spot)
         }
         MouseKind::Release => match state.selection.press.take() {
             Some(press) if !press.has_moved => click(state, mouse),
@@ -65,7 +65,7 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     let Some(press) = state.selection.press else { return Vec::new() };
     if state.selection.is_marking {
         if let Some((from, to)) = press.from.zip(spot_at(state, mouse.column, mouse.row)) {
-            rectangle::drag(state, from, to);
+            region::drag(state, from, to);
         }
         return Vec::new();
     }
@@ -167,7 +167,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
         return notify(state, messages::PINHOLE);
     }
     state.request.toggles.camera.focus = Some(distance);
-    let effects = camera::step_of_camera(state);
+    let effects = camera::camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
         say(state, messages::focus_moved(distance));
     }

@@ -1,7 +1,7 @@
 //! Handles terminal replies about its capabilities.
 
+use super::notices::say_until_key;
 use super::request::resized_preview;
-use super::say::say_until_key;
 use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
 use crate::graphics::Protocol;
@@ -14,8 +14,8 @@ use crate::terminals::TerminalId;
 use crate::view::ramp;
 
 /// Uses newly confirmed capabilities, if they were queried.
-pub(super) fn learn(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
-    let mut effects = judge(state, answer);
+pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
+    let mut effects = check_pixel_support(state, answer);
     match answer {
         TerminalReply::Name(terminal) => effects.extend(name(state, terminal)),
         TerminalReply::Focus { is_here } => state.display.has_focus = is_here,
@@ -49,7 +49,7 @@ enum PixelSupport {
     Lacks,
 }
 
-fn verdict(request: PixelRequest, answer: TerminalReply) -> PixelSupport {
+fn pixel_support(request: PixelRequest, answer: TerminalReply) -> PixelSupport {
     match answer {
         TerminalReply::Images(protocol) if protocol == request.protocol => PixelSupport::Has,
         TerminalReply::Name(terminal)
@@ -72,12 +72,12 @@ fn verdict(request: PixelRequest, answer: TerminalReply) -> PixelSupport {
 }
 
 /// Switches to pixels if a reply confirms that the terminal supports them.
-fn judge(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
+fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
     let Some(request) = state.display.pixels else { return Vec::new() };
-    match verdict(request, answer) {
+    match pixel_support(request, answer) {
         PixelSupport::Nothing => Vec::new(),
         PixelSupport::Lacks => {
-            lack_pixels(state);
+            report_missing_pixels(state);
             Vec::new()
         }
         PixelSupport::Has => {
@@ -91,7 +91,7 @@ fn judge(state: &mut State, answer: TerminalReply) -> Vec<Effect> {
 }
 
 /// Reports once that the terminal does not support pixels. A late confirmation is still accepted.
-pub(super) fn lack_pixels(state: &mut State) {
+pub(super) fn report_missing_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
         say_until_key(state, request.refusal());
@@ -114,12 +114,12 @@ fn name(state: &mut State, terminal: TerminalId) -> Vec<Effect> {
         state.dirty = true;
     }
     if ask.blocks {
-        effects.extend(draw_in(state, BlockGlyphs::of(terminal)));
+        effects.extend(use_blocks(state, BlockGlyphs::of(terminal)));
     }
     effects
 }
 
-fn draw_in(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
+fn use_blocks(state: &mut State, blocks: BlockGlyphs) -> Vec<Effect> {
     let kind = match blocks {
         BlockGlyphs::Unknown => return Vec::new(),
         BlockGlyphs::Sextants => PreviewKind::Sextant,
@@ -171,7 +171,9 @@ mod tests {
     fn missing_pixel_support_is_reported_once() {
         let mut ui = wanting_pixels(ImageRoute::Direct);
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
-        assert!(ui.text().contains("this terminal shows no kitty images"), "{}", ui.text());
+        assert!(ui.text().contains("kitty images"), "{}", ui.text());
+        let refusal = ui.state.display.pixels.map(PixelRequest::refusal);
+        assert_eq!(ui.state.overlays.message.as_ref().map(|message| message.words.clone()), refusal);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         ui.press('s');
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
@@ -199,10 +201,10 @@ mod tests {
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
         let foot = TerminalReply::Name(TerminalId { brand: Brand::Foot, version: [1, 20] });
-        assert!(learn(&mut state, foot).is_empty(), "not queried");
+        assert!(handle_reply(&mut state, foot).is_empty(), "not queried");
         assert_eq!(state.display.capabilities, Capabilities::default());
         state.display.ask = TerminalQueries { blocks: true, ..TerminalQueries::default() };
-        let effects = learn(&mut state, foot);
+        let effects = handle_reply(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
         assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
         assert_eq!(state.display.kind, PreviewKind::Octant);
@@ -213,9 +215,12 @@ mod tests {
         let mut state = state(80, 24);
         state.display.ask = TerminalQueries { name: true, ..TerminalQueries::default() };
         let ghostty = TerminalId { brand: Brand::Ghostty, version: [1, 2] };
-        assert!(matches!(learn(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
+        assert!(matches!(handle_reply(&mut state, TerminalReply::Name(ghostty))[..], [Effect::ReportFocus]));
         assert_eq!(state.display.capabilities, ghostty.capabilities());
-        assert!(learn(&mut state, TerminalReply::Name(ghostty)).is_empty(), "focus reports are already on");
+        assert!(
+            handle_reply(&mut state, TerminalReply::Name(ghostty)).is_empty(),
+            "focus reports are already on"
+        );
     }
 
     #[test]
@@ -228,7 +233,7 @@ mod tests {
             TerminalReply::TrueColor,
         ];
         for answer in answers {
-            learn(&mut state, answer);
+            handle_reply(&mut state, answer);
         }
         assert_eq!(
             (state.display.ansi, state.display.is_light, state.display.depth),
@@ -241,7 +246,7 @@ mod tests {
             ..TerminalQueries::default()
         };
         for answer in answers {
-            learn(&mut state, answer);
+            handle_reply(&mut state, answer);
         }
         assert_eq!(state.display.ansi[1], [180, 30, 30]);
         assert_eq!((state.display.is_light, state.display.depth), (true, ColorDepth::TrueColor));

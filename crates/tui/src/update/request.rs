@@ -20,7 +20,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.is_exposure_only = before == now && before != state.request.toggles;
     if state.request.is_exposure_only {
         // The exposure changes only how the image is shown.
-        state.picture.history.go_on(state.request.generation);
+        state.picture.history.transfer_to_next(state.request.generation);
     }
     state.request.generation += 1;
     let is_moved = state.request.toggles.camera.is_any();

@@ -2,8 +2,8 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
+use super::notices::say;
 use super::request::render;
-use super::say::say;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
 use crate::keymap::OverlayAction;
@@ -41,7 +41,7 @@ pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Eff
     Some(choose(state, View::ALL[chosen]))
 }
 
-/// Handles a key while a name is typed. `None` otherwise.
+/// Handles a key while a name is typed. `None` if no search is active.
 pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.contains(KeyModifiers::CONTROL);

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use super::notices::{say, say_until_key};
 use super::request::resized_preview;
-use super::say::{say, say_until_key};
 use super::{camera, history, pointer};
 use crate::event::{Effect, WriteFailure};
 use crate::exit_summary;
@@ -57,7 +57,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             state.request.drop_saved_changes();
             let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
-            mended(state);
+            clear_problems(state);
             state.picture.history.read();
             if pinhole {
                 say(state, messages::PINHOLE);
@@ -230,10 +230,10 @@ fn wrote(state: &mut State, paths: &[PathBuf]) {
     let is_open = state.picture.history.is_open();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
-    say(state, format!("wrote {}{which}", names.join(", ")));
+    say(state, messages::wrote(&names.join(", ")) + which);
 }
 
-/// Records a written file. It is shown beside the image, since a message would cover the keys.
+/// Records a written file. It is shown next to the image, since a message would cover the keys.
 fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
     // Other outputs may still have failed.
     let is_by_hand = state.work.activity == Activity::Done;
@@ -301,7 +301,7 @@ fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
 }
 
 /// Removes the problems once the file is valid again.
-fn mended(state: &mut State) {
+fn clear_problems(state: &mut State) {
     if state.overlays.problems.take().is_some() {
         state.overlays.diagnostics = Pane::default();
     }
@@ -310,7 +310,7 @@ fn mended(state: &mut State) {
 fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
     add_earlier_seconds(&mut report);
     state.overlays.message.take_if(|message| message.words.starts_with(messages::RESUMING));
-    mended(state);
+    clear_problems(state);
     for stage in &report.stages {
         record(state, stage.clone());
     }

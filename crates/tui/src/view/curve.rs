@@ -14,17 +14,17 @@ use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
 /// Minimum and maximum rows of the chart.
-const LEAST_ROWS: u16 = 6;
-const MOST_ROWS: u16 = 12;
+const MIN_ROWS: u16 = 6;
+const MAX_ROWS: u16 = 12;
 /// More columns show no more detail.
-const MOST_COLUMNS: u16 = 60;
+const MAX_COLUMNS: u16 = 60;
 /// A curve needs this many points, whose times differ by this factor.
-const LEAST_POINTS: usize = 3;
-const LEAST_RATIO: f64 = 1.5;
+const MIN_POINTS: usize = 3;
+const MIN_RATIO: f64 = 1.5;
 
 /// Draws the chart at the top of an area. Returns the rows used: 0 if there is no curve or no room.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
-    let area = Rect { width: area.width.min(MOST_COLUMNS), ..area }.intersection(buffer.area);
+    let area = Rect { width: area.width.min(MAX_COLUMNS), ..area }.intersection(buffer.area);
     let (Some(rows), Some(points)) = (rows(state, area), points(state)) else { return 0 };
     let depth = state.display.depth;
     put(buffer, row(area, 0), &[(messages::NOISE_OVER_TIME, Tone::Strong)], depth);
@@ -39,16 +39,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 
 /// Rows of the chart with its caption. `None` if they do not fit.
 pub(super) fn rows(state: &State, area: Rect) -> Option<u16> {
-    let words = 1 + caption(state, points(state)?, area.width.min(MOST_COLUMNS)).len() as u16;
-    let chart = area.height.checked_sub(words)?.min(MOST_ROWS);
-    (chart >= LEAST_ROWS && area.width >= 20).then_some(words + chart)
+    let words = 1 + caption(state, points(state)?, area.width.min(MAX_COLUMNS)).len() as u16;
+    let chart = area.height.checked_sub(words)?.min(MAX_ROWS);
+    (chart >= MIN_ROWS && area.width >= 20).then_some(words + chart)
 }
 
 /// The points of the current image, if they form a curve.
 fn points(state: &State) -> Option<&[(f64, f64)]> {
     let points = state.work.curve.points();
     let [(first, _), .., (last, _)] = points else { return None };
-    (points.len() >= LEAST_POINTS && *last >= first * LEAST_RATIO).then_some(points)
+    (points.len() >= MIN_POINTS && *last >= first * MIN_RATIO).then_some(points)
 }
 
 /// The requested noise per tile.

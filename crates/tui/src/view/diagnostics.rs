@@ -1,4 +1,4 @@
-//! The pane of errors and warnings, beside the image or over its lower part.
+//! The pane of errors and warnings, next to the image or over its lower part.
 
 use std::collections::HashMap;
 
@@ -15,10 +15,10 @@ use crate::scene::sanitize::visible;
 use crate::state::State;
 
 /// Maximum number of faults shown; the rest appears once these are fixed.
-const MOST: usize = 100;
+const MAX: usize = 100;
 
 /// Maximum number of positions shown per fault.
-const MOST_PLACES: usize = 10;
+const MAX_PLACES: usize = 10;
 
 /// Draws the pane from its scroll position.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
@@ -117,9 +117,9 @@ fn reported(diagnostics: &[Diagnostic], width: usize) -> Vec<StyledLine> {
     }
     faults.sort_by_key(|fault| (fault[0].severity != Severity::Error, &fault[0].path, start(fault[0])));
     let mut lines: Vec<StyledLine> =
-        faults.iter().take(MOST).flat_map(|fault| one_fault(fault, width)).collect();
+        faults.iter().take(MAX).flat_map(|fault| one_fault(fault, width)).collect();
     lines.pop();
-    if let Some(more @ 1..) = faults.len().checked_sub(MOST) {
+    if let Some(more @ 1..) = faults.len().checked_sub(MAX) {
         lines.push(StyledLine::new());
         lines.push(vec![(format!("… {} are not shown", counted(more, "more fault")), Tone::Plain)]);
     }
@@ -143,7 +143,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
     let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
     if !places.is_empty() {
-        let shown = places.len().min(MOST_PLACES - 1);
+        let shown = places.len().min(MAX_PLACES - 1);
         let more = match places.len() - shown {
             0 => String::new(),
             more => format!(" and {more} more"),

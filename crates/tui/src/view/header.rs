@@ -24,30 +24,30 @@ use crate::state::{Activity, State};
 /// Width from which the state block has a fixed width.
 const WIDE: u16 = 60;
 /// Minimum columns of a shortened name.
-const LEAST_NAME: u16 = 6;
+const MIN_NAME: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.header;
     let used = block(state, area, buffer);
     let mut room = rest(area, used + 1);
     // Without another line, a message takes the whole header.
-    if layout.keys.is_empty() && message::is_said(state, layout) {
+    if layout.keys.is_empty() && message::replaces_line(state, layout) {
         return;
     }
     if state.picture.is_alone {
         let back =
-            keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
+            keymap::of(Action::ShowImageOnly).map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
     let figures = figures(state);
     // Keep some room for the name if the shortest figures allow it.
-    let fitting = [LEAST_NAME + 1, 0]
+    let fitting = [MIN_NAME + 1, 0]
         .into_iter()
         .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
     room.width -=
         put_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
     room.width = room.width.saturating_sub(1);
-    if room.width >= LEAST_NAME {
+    if room.width >= MIN_NAME {
         name(state, room, buffer);
     }
 }
@@ -152,11 +152,11 @@ fn figures(state: &State) -> Vec<String> {
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", last_run(state));
-                (place.clone(), format!("render {place}"))
+                (place, messages::render_of(run, last_run(state)))
             }
             None => {
-                let place = if is_unfinished { messages::STOPPED } else { "older" };
-                (place.to_owned(), format!("{place} render"))
+                let place = if is_unfinished { messages::STOPPED } else { messages::OLDER };
+                (place.to_owned(), messages::unnumbered_render(place))
             }
         };
         let age = ago(state.now.saturating_duration_since(time));
@@ -213,11 +213,11 @@ fn last_run(state: &State) -> u64 {
 /// Remaining time, unless the render is paused.
 fn eta(state: &State, progress: &RenderProgress) -> String {
     /// Less rounds to zero.
-    const LEAST: f64 = 0.05;
+    const MIN: f64 = 0.05;
     let eta = match Eta::of(progress) {
         None => "…".to_owned(),
         Some(Eta::OverADay) => Eta::OverADay.words(),
-        Some(Eta::Seconds(eta)) if eta < LEAST => "under 1 s".to_owned(),
+        Some(Eta::Seconds(eta)) if eta < MIN => "under 1 s".to_owned(),
         Some(Eta::Seconds(eta)) => running(Duration::try_from_secs_f64(eta).unwrap_or_default()),
     };
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }

@@ -57,8 +57,8 @@ const BESIDE: u16 = 3;
 
 /// Columns of the labels in a help of this width.
 fn labels(width: u16) -> u16 {
-    const LEAST: u16 = 9;
-    widest(|(label, _)| label).min(LEAST.max(width / 3))
+    const MIN: u16 = 9;
+    widest(|(label, _)| label).min(MIN.max(width / 3))
 }
 
 /// The entries, wrapped into lines.

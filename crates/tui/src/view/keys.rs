@@ -49,7 +49,7 @@ const OF_USE: u16 = 26;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.keys;
-    if layout.under.is_empty() && message::is_said(state, layout) {
+    if layout.under.is_empty() && message::replaces_line(state, layout) {
         return;
     }
     let ways = [KeyHint::of(Action::Quit), KeyHint::of(Action::ToggleHelp)];
@@ -62,7 +62,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let room = area.width.saturating_sub(width(ways, true).saturating_sub(GAP));
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
-    for hint in fitting(of_use_first(state), toggles, room, is_long) {
+    for hint in fitting(current_hints(state), toggles, room, is_long) {
         left = rest(left, show(&hint, left, is_long, state, buffer));
     }
     let mut right = rest(area, room);
@@ -131,7 +131,7 @@ fn toggles(state: &State) -> Vec<KeyHint> {
 }
 
 /// Hints of current use: the urgent ones and the others.
-fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
+fn current_hints(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     let overlay = |wanted: &[OverlayAction]| -> Vec<KeyHint> {
         let of = OVERLAY.iter().filter(|it| wanted.contains(&it.action) && !it.hint.is_empty());
         of.map(|it| KeyHint::new(it.label, it.hint)).collect()
@@ -146,58 +146,58 @@ fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
     }
     let mut urgent = Vec::new();
     if let Some(views) = &state.overlays.views {
-        urgent.extend(of_views(views).into_iter().chain(closing()));
+        urgent.extend(view_list_hints(views).into_iter().chain(closing()));
     } else if state.overlays.diagnostics.open {
         let (_, last) = super::diagnostics::extent(state);
         urgent.extend(scrolling(last, &[OverlayAction::LineDown]).into_iter().chain(closing()));
     }
-    urgent.extend(unseen(state));
+    urgent.extend(hidden_diagnostics(state));
     let named = |action, words| keymap::of(action).map(|it| KeyHint::new(it.label, words));
     let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
     if has_place && !is_mesh(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
     }
     if state.picture.history.is_open() {
-        urgent.extend(named(Action::BeforeAfter, "newest"));
+        urgent.extend(named(Action::CompareLastEdit, "newest"));
         let both = if state.picture.history.is_oldest_open() {
-            named(Action::NewerPicture, "newer")
+            named(Action::NewerRender, "newer")
         } else {
-            named(Action::OlderPicture, "older, newer")
+            named(Action::OlderRender, "older, newer")
         };
         urgent.extend(both);
         // All other keys concern the newest render.
-        return (urgent, KeyHint::of(Action::PictureAlone).into_iter().collect());
+        return (urgent, KeyHint::of(Action::ShowImageOnly).into_iter().collect());
     }
     if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
     if state.picture.close_up.is_some() {
-        urgent.extend(named(Action::CloseUp, "back"));
+        urgent.extend(named(Action::ActualPixels, "back"));
     }
     if state.request.first_section.is_some() {
-        let first = named(Action::RectangleFirst, "region first");
+        let first = named(Action::RenderRegionFirst, "region first");
         urgent.extend(first.map(|hint| KeyHint { tone: Tone::Strong, ..hint }));
     }
-    let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
+    let reset = keymap::of(Action::ResetSettings).map_or("", |it| it.label);
     let changed = |words| KeyHint { tone: Tone::Strong, ..KeyHint::new(reset, words) };
     let changes = state.request.changes().join(", ");
     urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
-        _ if state.work.paused => &[Action::TogglePause, Action::WriteNow],
+        _ if state.work.paused => &[Action::TogglePause, Action::WriteImage],
         Activity::Running { .. } => &[Action::TogglePause],
         Activity::Done | Activity::Waiting | Activity::Broken | Activity::Cancelled => &[],
     };
-    let first = now.iter().filter_map(|action| KeyHint::of(*action)).map(|hint| going_on(hint, state));
+    let first = now.iter().filter_map(|action| KeyHint::of(*action)).map(|hint| pause_hint(hint, state));
     let (held, first): (Vec<KeyHint>, Vec<KeyHint>) = first.partition(|_| state.work.paused);
     urgent.extend(held);
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
     let has_picture = state.display.kind != PreviewKind::None;
-    let is_shown = |it: &&Binding| it.action != Action::PictureAlone || has_picture;
+    let is_shown = |it: &&Binding| it.action != Action::ShowImageOnly || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
-    // Another hint above shows the key with what it resets.
+    // Another hint above shows the key with the changes that it resets.
     let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
-    let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
+    let is_back = |it: &&Binding| it.action != Action::ResetSettings || is_of_use;
     let others = KEYMAP
         .iter()
         .filter(is_other)
@@ -209,7 +209,7 @@ fn of_use_first(state: &State) -> (Vec<KeyHint>, Vec<KeyHint>) {
 }
 
 /// Keys of the list of views, or the search text.
-fn of_views(views: &ViewList) -> Vec<KeyHint> {
+fn view_list_hints(views: &ViewList) -> Vec<KeyHint> {
     match &views.name {
         Some(name) => vec![KeyHint { tone: Tone::Strong, ..KeyHint::new("/", format!("{name}▏")) }],
         None => [("1-9", "choose"), ("j k", "move"), ("/", "find")]
@@ -230,13 +230,13 @@ const ELSEWHERE: [Action; 8] = [
     Action::CycleIntegrator,
 ];
 
-fn going_on(hint: KeyHint, state: &State) -> KeyHint {
+fn pause_hint(hint: KeyHint, state: &State) -> KeyHint {
     let is_pause = keymap::of(Action::TogglePause).is_some_and(|it| it.label == hint.key);
     if is_pause && state.work.paused { KeyHint::new(hint.key, "resume") } else { hint }
 }
 
 /// Errors and warnings in a closed pane.
-fn unseen(state: &State) -> Option<KeyHint> {
+fn hidden_diagnostics(state: &State) -> Option<KeyHint> {
     let key = keymap::of(Action::ToggleDiagnostics)?.label;
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,

@@ -15,13 +15,13 @@ pub(crate) struct Layout {
     /// State and name; the only line with `tab`.
     pub header: Rect,
     pub preview: Rect,
-    /// Stages and results, beside or below the image. If empty, the status line shows them.
+    /// Stages and results, next to or below the image. If empty, the status line shows them.
     pub panel: Rect,
     /// The status line below the image: message, progress or result.
     pub under: Rect,
     /// The line of keys.
     pub keys: Rect,
-    /// Area of the diagnostics: beside the image or over its lower part.
+    /// Area of the diagnostics: next to the image or over its lower part.
     pub pane: Rect,
 }
 
@@ -35,9 +35,9 @@ const THREE_LINES: u16 = 14;
 const SIDE_WIDTH: u16 = 23;
 /// Columns of a stage including the gap to the next one.
 pub(super) const ENTRY_WIDTH: u16 = 26;
-/// Minimum rows of a panel beside the image: half of the stages.
+/// Minimum rows of a panel next to the image: half of the stages.
 const SIDE_HEIGHT: u16 = 4;
-/// Minimum share of its cells that the image keeps beside a panel; otherwise there is no panel.
+/// Minimum share of its cells that the image keeps next to a panel; otherwise there is no panel.
 const KEPT: f32 = 0.9;
 /// Minimum sizes of a panel that also shows diagnostics: narrow panels must be high.
 const TEXT_SIZES: [(u16, u16); 2] = [(44, 8), (34, 16)];

@@ -48,12 +48,12 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
 }
 
 /// Whether a message replaces a whole line. The status line is shared instead.
-pub(super) fn is_said(state: &State, layout: &Layout) -> bool {
+pub(super) fn replaces_line(state: &State, layout: &Layout) -> bool {
     words(state, layout).is_some()
 }
 
 /// The part of the status line that a message leaves.
-pub(super) fn left_under(state: &State, layout: &Layout) -> Rect {
+pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
     let spot = words(state, layout).map(|(words, _)| spot(state, layout, &words));
     let used = match spot {
         Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,

@@ -1,4 +1,4 @@
-//! The panel beside or below the image: stages and loading assets while they run, then the results.
+//! The panel next to or below the image: stages and loading assets while they run, then the results.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -77,7 +77,7 @@ fn rows(lines: &[StyledLine], columns: u16, room: Rect) -> u16 {
 }
 
 /// The lines of a panel of this width; hints are wrapped to a column. Reasons of stages are shown in full, or
-/// shortened to fit beside the stages.
+/// shortened to fit next to the stages.
 fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<StyledLine> {
     let is_done = matches!(state.work.activity, Activity::Done);
     let mut lines = inspected(state, width);
@@ -122,13 +122,13 @@ fn is_broken(state: &State) -> bool {
 
 fn asset_line(state: &State, asset: &AssetBar, width: u16) -> StyledLine {
     let fraction = stages::fraction(asset);
-    let (filled, empty) = gauge(fraction, BAR, state.display.kind == PreviewKind::Ascii);
+    let (filled_squares, empty) = gauge(fraction, BAR, state.display.kind == PreviewKind::Ascii);
     let percent = format!(" {:3} %", percent(fraction));
     let room = width.min(2 * ENTRY_WIDTH).saturating_sub(BAR + columns(&percent) + 1);
     let name = shortened(&visible(&asset.progress.name), room);
     let pad = usize::from(room - columns(&name).min(room)) + 1;
     let name = name + &" ".repeat(pad);
-    vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
+    vec![(name, Tone::Plain), (filled_squares, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
 /// The results, one label and value per line.

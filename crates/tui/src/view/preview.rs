@@ -110,11 +110,11 @@ impl<'a> PreviewColors<'a> {
 pub fn shown(picture: &Picture, choice: PreviewChoice, depth: ColorDepth, area: Rect) -> Buffer {
     let shades = ColorMapper::new(depth, &XTERM);
     let inks = PreviewColors { depth, shades: &shades, is_light: false };
-    shown_by(picture, choice, inks, (area, 2.0))
+    draw_image(picture, choice, inks, (area, 2.0))
 }
 
 /// Draws an image with these color settings and cells of another aspect ratio.
-pub(crate) fn shown_by(
+pub(crate) fn draw_image(
     picture: &Picture,
     choice: PreviewChoice,
     inks: PreviewColors<'_>,

@@ -23,7 +23,7 @@ const RAMP: [(char, f32); 15] = [
     ('&', 0.233),
     ('@', 0.267),
 ];
-const MOST_INK: f32 = RAMP[RAMP.len() - 1].1;
+const MAX_INK: f32 = RAMP[RAMP.len() - 1].1;
 
 /// Mapping from brightness to ink.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl Ramp {
     /// increased at most four times.
     pub(super) fn of(picture: &Picture, is_light: bool) -> Self {
         const STEPS: f32 = 16.0;
-        const LEAST: f32 = 0.25;
+        const MIN: f32 = 0.25;
         let mut counts = [0_usize; 256];
         for pixel in &picture.pixels {
             let level = linear_to_srgb8(luminance(srgb8_to_linear(*pixel)));
@@ -50,8 +50,7 @@ impl Ramp {
         let beyond = picture.pixels.len() / 30;
         let low = (end(&counts, 0..256, beyond) * STEPS).floor() / STEPS;
         let high = (end(&counts, (0..256).rev(), beyond) * STEPS).ceil() / STEPS;
-        let (low, high) =
-            if high - low < LEAST { (high.min(1.0) - LEAST, high.min(1.0)) } else { (low, high) };
+        let (low, high) = if high - low < MIN { (high.min(1.0) - MIN, high.min(1.0)) } else { (low, high) };
         Self { low: low.max(0.0), high, is_light }
     }
 
@@ -83,7 +82,7 @@ impl Ramp {
     /// character.
     fn nearest(self, brightness: f32) -> char {
         let off = |ink: f32| {
-            let covered = ink / MOST_INK;
+            let covered = ink / MAX_INK;
             // Near white, the loss of brightness is about proportional to the ink.
             let seen = if self.is_light { 1.0 - covered } else { linear_to_srgb(covered) };
             (seen - brightness).abs()

@@ -25,7 +25,7 @@ fn is_wide(state: &State) -> bool {
     state.display.window.columns >= WIDE
 }
 
-/// The free area beside or below the lines.
+/// The free area next to or below the lines.
 fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;

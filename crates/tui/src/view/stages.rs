@@ -1,6 +1,7 @@
 //! The stages: one line each while they run, a single line afterwards.
 
 use super::text::{Tone, columns, counted, delta, seconds, shortened, wrapped};
+use crate::messages;
 use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
 use crate::state::{AssetBar, State};
@@ -13,9 +14,9 @@ const SMALL: f64 = 0.02;
 /// Columns of a name and a time, including the gap.
 const TIME_ENDS: u16 = 16;
 /// Minimum columns of a reason.
-const LEAST_WHY: u16 = 12;
+const MIN_WHY: u16 = 12;
 
-/// Symbol, name, time, change and reason. The reason gets its own lines if there is no room beside them.
+/// Symbol, name, time, change and reason. The reason gets its own lines if there is no room next to them.
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = figures(state, stage, room);
     let why = why(state, stage);
@@ -35,13 +36,13 @@ pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
 pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
     let mut line = figures(state, stage, room);
     let (why, room) = (why(state, stage), beside(&line, room));
-    if !why.is_empty() && (room >= LEAST_WHY || columns(&why) <= room) {
+    if !why.is_empty() && (room >= MIN_WHY || columns(&why) <= room) {
         line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
     }
     vec![line]
 }
 
-/// Columns for a reason beside a stage.
+/// Columns for a reason next to a stage.
 fn beside(line: &StyledLine, room: u16) -> u16 {
     room.saturating_sub(width(line) + 2)
 }
@@ -104,21 +105,21 @@ fn change(state: &State, report: &StageReport) -> String {
 
 /// The stages that took a significant part of the time and the number of cached ones, shortened to fit. Empty
 /// if not even the longest stage fits.
-pub(super) fn in_one_line(state: &State, room: u16) -> StyledLine {
+pub(super) fn summary_line(state: &State, room: u16) -> StyledLine {
     let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
     let total: f64 = done().map(|it| it.seconds).sum();
     let longest = done().map(|it| it.seconds).fold(0.0, f64::max);
     let first = done().find(|it| it.seconds >= longest).map(|it| it.name);
     let counts = |it: &StageReport| it.seconds >= SMALL * total;
     let forms = [
-        in_one_line_of(state, true, counts),
-        in_one_line_of(state, false, counts),
-        in_one_line_of(state, false, |it| Some(it.name) == first),
+        summary_line_with(state, true, counts),
+        summary_line_with(state, false, counts),
+        summary_line_with(state, false, |it| Some(it.name) == first),
     ];
     forms.into_iter().find(|line| width(line) <= room).unwrap_or_default()
 }
 
-fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> StyledLine {
+fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> StyledLine {
     let mut line = StyledLine::new();
     let mut reused = 0;
     for report in state.work.stages.iter().flatten() {
@@ -138,7 +139,7 @@ fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) ->
     if reused > 0 {
         let comma = if line.is_empty() { "" } else { ", " };
         let stages = if is_long { counted(reused, "stage") } else { reused.to_string() };
-        line.push((format!("{comma}{stages} cached"), Tone::Faint));
+        line.push((comma.to_owned() + &messages::cached(&stages), Tone::Faint));
     }
     line
 }

@@ -23,7 +23,7 @@ use crate::state::{Activity, OwnImage, State, WrittenFile};
 const SHORT_HINT: &str = "save it to re-render";
 const SHORT_HINT_OF_MODEL: &str = "re-renders on changes";
 /// Minimum columns of a progress bar.
-const LEAST_BAR: u16 = 6;
+const MIN_BAR: u16 = 6;
 
 /// Draws the status line in the part that a message leaves.
 pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
@@ -54,7 +54,7 @@ fn content(state: &State) -> StatusContent {
         Activity::Running { .. } => StatusContent::ProgressBar,
         Activity::Done => StatusContent::Summary,
         Activity::Waiting | Activity::Cancelled => StatusContent::Nothing,
-        Activity::Broken if let Some(progress) = goes_on(state) => {
+        Activity::Broken if let Some(progress) = last_good_progress(state) => {
             StatusContent::Words(messages::last_good_renders(percent(progress.fraction)))
         }
         Activity::Broken if state.picture.shown.is_some() => {
@@ -77,7 +77,7 @@ pub(super) fn least_columns(state: &State, layout: &Layout) -> u16 {
 }
 
 /// Progress of the last valid scene, which continues to render while the file is broken.
-pub(crate) fn goes_on(state: &State) -> Option<&RenderProgress> {
+pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
     let is_broken = matches!(state.work.activity, Activity::Broken | Activity::Waiting);
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
@@ -110,18 +110,24 @@ fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // The end of a pause cannot be predicted.
     let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
-    let fits = |noise: &String| room >= columns(noise) + 3 + LEAST_BAR;
+    let fits = |noise: &String| room >= columns(noise) + 3 + MIN_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
-    if room < LEAST_BAR {
+    if room < MIN_BAR {
         put(buffer, area, &[(&words, Tone::Plain)], state.display.depth);
         return;
     }
-    let (filled, empty) = gauge(fraction, room, state.display.kind == PreviewKind::Ascii);
+    let (filled_squares, empty) = gauge(fraction, room, state.display.kind == PreviewKind::Ascii);
     let (tone, gap) = (if state.work.paused { Tone::Warning } else { Tone::Working }, (" ", Tone::Plain));
-    let pieces =
-        [(name, Tone::Faint), gap, (&*filled, tone), (&*empty, Tone::Faint), gap, (&*words, Tone::Plain)];
+    let pieces = [
+        (name, Tone::Faint),
+        gap,
+        (&*filled_squares, tone),
+        (&*empty, Tone::Faint),
+        gap,
+        (&*words, Tone::Plain),
+    ];
     put(buffer, area, &pieces, state.display.depth);
 }
 
@@ -137,7 +143,7 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
     let of_files = file_pieces(state, layout);
     // Files take precedence if there is not enough room.
     let room = area.width.saturating_sub(least_columns(state, layout));
-    let mut pieces = stages::in_one_line(state, room);
+    let mut pieces = stages::summary_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, Tone)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
@@ -232,7 +238,7 @@ pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
 
 /// Time from the save to the first changed cell.
 pub(super) fn seen(state: &State) -> Option<String> {
-    state.saving.first_change.map(|time| format!("on screen {} after save", duration(time)))
+    state.saving.first_change.map(|time| messages::on_screen(&duration(time)))
 }
 
 /// A hint for a user who has not saved yet, unless there is nothing to save.
@@ -261,8 +267,7 @@ fn is_unreadable(state: &State) -> bool {
 /// Cost of the last preview: bytes with the round trip, or bytes only.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
-    let size = format!("{} kB sent", frame.bytes.div_ceil(1000));
+    let cost = |time| messages::preview_cost(frame.bytes.div_ceil(1000), time);
     let time = frame.round_trip.map(|time| time.as_millis().max(1));
-    let both = time.map(|time| format!("{size} · {time} ms round trip"));
-    both.into_iter().chain([size]).collect()
+    time.map(|time| cost(Some(time))).into_iter().chain([cost(None)]).collect()
 }

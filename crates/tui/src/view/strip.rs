@@ -24,8 +24,8 @@ const NARROW_ROWS: EntryRows = EntryRows { picture: 3, entry: 4, pitch: 4 };
 const WIDE_ROWS: EntryRows = EntryRows { picture: 5, entry: 5, pitch: 6 };
 /// Minimum columns of a wide strip.
 const WIDE: u16 = 40;
-/// Minimum columns of the text beside a thumbnail.
-const LEAST_WORDS: u16 = 10;
+/// Minimum columns of the text next to a thumbnail.
+const MIN_WORDS: u16 = 10;
 /// Width of a column if there are several.
 const COLUMN: u16 = 44;
 
@@ -42,7 +42,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let items = items(state, area);
     let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
     let depth = state.display.depth;
-    let keys = keymap::of(Action::OlderPicture).map_or("", |binding| binding.label).replace(' ', " / ");
+    let keys = keymap::of(Action::OlderRender).map_or("", |binding| binding.label).replace(' ', " / ");
     let title = Rect { y: top - 1, height: 1, ..area };
     put(
         buffer,
@@ -63,7 +63,7 @@ fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buff
     preview::draw_small(state, picture, place, buffer);
     let is_looked_at = history.looked_at() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
-    // The text is beside the thumbnail, in the same columns with and without a mark.
+    // The text is next to the thumbnail, in the same columns with and without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", number(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
@@ -90,7 +90,7 @@ fn is_under_way(state: &State, index: usize) -> bool {
 fn width(state: &State, picture: &Picture, cells: Rect) -> u16 {
     let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
     let width = (f32::from(cells.height) * shape).round() as u16;
-    width.clamp(1, cells.width.saturating_sub(LEAST_WORDS + 1).max(1))
+    width.clamp(1, cells.width.saturating_sub(MIN_WORDS + 1).max(1))
 }
 
 /// Rows of the strip in an area. 0 if there is nothing to choose from or no room.
@@ -110,7 +110,7 @@ fn items(state: &State, area: Rect) -> Vec<StripEntry> {
     // The title takes one row.
     let most = (area.height + gap).saturating_sub(1) / rows.pitch;
     let room = usize::from(most) * usize::from(columns);
-    if count < 2 || room < 2 || area.width < LEAST_WORDS + 8 {
+    if count < 2 || room < 2 || area.width < MIN_WORDS + 8 {
         return Vec::new();
     }
     let shown = count.min(room);

@@ -91,7 +91,7 @@ impl ChangePiece {
         Self { text: text.into(), is_key: false }
     }
 
-    /// The parts after which a line may break: those of a key, or words.
+    /// The parts after which a line may break: parts of the key, or words.
     fn parts(&self) -> Vec<String> {
         if !self.is_key {
             return self.text.split(' ').map(str::to_owned).collect();

@@ -212,8 +212,8 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
 pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
     let columns = usize::from(columns);
-    let filled = ((fraction.clamp(0.0, 1.0) * columns as f64).floor() as usize).min(columns);
-    (full.repeat(filled), empty.repeat(columns - filled))
+    let filled_squares = ((fraction.clamp(0.0, 1.0) * columns as f64).floor() as usize).min(columns);
+    (full.repeat(filled_squares), empty.repeat(columns - filled_squares))
 }
 
 /// Whole percent; 100 only when finished.
@@ -271,8 +271,8 @@ mod tests {
     #[test]
     fn bar_is_full_only_at_the_end() {
         let bar = |fraction, ascii| {
-            let (filled, rest) = gauge(fraction, 4, ascii);
-            filled + &rest
+            let (filled_squares, rest) = gauge(fraction, 4, ascii);
+            filled_squares + &rest
         };
         assert_eq!(bar(0.999, false), "━━━─");
         assert_eq!(bar(1.0, false), "━━━━");

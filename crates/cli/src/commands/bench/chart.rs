@@ -12,7 +12,7 @@ use crate::bench::{Results, SceneResult};
 use crate::console::Console;
 use crate::progress::seconds;
 use crate::scene::sanitize::visible;
-use crate::tui::paint::in_lines;
+use crate::tui::paint::as_text_lines;
 
 /// Colors of the methods, in their order, from the palette of the terminal.
 const COLORS: [Color; 6] =
@@ -69,7 +69,7 @@ impl Lines {
         if self.methods.is_empty() || size.0 < LEAST.0 || size.1 < LEAST.1 {
             return String::new();
         }
-        in_lines(&self.drawn(size), is_colored)
+        as_text_lines(&self.drawn(size), is_colored)
     }
 
     fn drawn(&self, (columns, rows): (u16, u16)) -> Buffer {
@@ -120,7 +120,7 @@ pub(super) fn show(results: &Results, console: &Console) {
     let columns = crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(LEAST.0, COLUMNS));
     for scene in &results.scenes {
         console.answer(&format!("{}: relMSE against seconds, both logarithmic", scene.scene));
-        console.text(&in_lines(&Lines::of(scene).drawn((columns, ROWS)), console.is_colored()));
+        console.text(&as_text_lines(&Lines::of(scene).drawn((columns, ROWS)), console.is_colored()));
     }
 }
 
@@ -170,12 +170,12 @@ mod tests {
     #[test]
     fn the_chart_has_its_lines_names_and_ends() {
         let buffer = Lines::of(&scene()).drawn((60, ROWS));
-        let plain = in_lines(&buffer, false);
+        let plain = as_text_lines(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
         assert!(plain.lines().all(|line| line.chars().count() <= 60) && !plain.contains('\u{1b}'), "{plain}");
         assert_eq!(plain.matches('o').count(), 2 + 1, "two points and the legend: {plain}");
-        let colored = in_lines(&buffer, true);
+        let colored = as_text_lines(&buffer, true);
         let ends = |line: &str| line.rfind('\u{1b}') == line.rfind("\u{1b}[0m");
         assert!(colored.contains("\u{1b}[34m") && colored.lines().all(ends), "{colored}");
     }
@@ -184,7 +184,7 @@ mod tests {
     fn nothing_measured_is_drawn_too() {
         let mut empty = scene();
         empty.methods.clear();
-        assert!(!in_lines(&Lines::of(&empty).drawn((30, ROWS)), true).is_empty());
+        assert!(!as_text_lines(&Lines::of(&empty).drawn((30, ROWS)), true).is_empty());
     }
 
     #[test]

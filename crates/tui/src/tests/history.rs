@@ -1,4 +1,4 @@
-//! Tests of the screen while an older picture is looked at: what it says is of that picture.
+//! The screen while an older render is shown.
 
 use crossterm::event::KeyCode;
 
@@ -6,9 +6,10 @@ use super::{BLUE, RED};
 use crate::Changed;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
+use crate::messages;
 use crate::pipeline::protocol::{Command, Event as WorkerEvent, Kept, Picked};
 
-/// A beauty, then hard shadows in the view of normals; the beauty is looked at.
+/// A beauty image, then one with hard shadows in the view of normals; the beauty image is open.
 fn older() -> TestUi {
     let mut ui = TestUi::with(state(120, 40));
     ui.finish(RED);
@@ -25,7 +26,7 @@ fn line(ui: &mut TestUi, row: usize) -> String {
 }
 
 #[test]
-fn it_answers_no_question_about_its_objects() {
+fn older_render_cannot_be_inspected() {
     let mut ui = older();
     let asks = |effects: &[Effect]| effects.iter().any(|it| matches!(it, Effect::Send(Command::Pick(_))));
     let mouse = |kind| Event::Mouse(Mouse { kind, column: 40, row: 20 });
@@ -34,21 +35,21 @@ fn it_answers_no_question_about_its_objects() {
     {
         let effects: Vec<Effect> = keys.iter().flat_map(|key| ui.key(*key)).collect();
         assert!(!asks(&effects), "{keys:?}");
-        assert!(ui.text().contains("of an older picture nothing is known"), "{}", ui.text());
+        assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
     }
     ui.event(mouse(MouseKind::Press));
     assert!(!asks(&ui.event(mouse(MouseKind::Release))));
-    assert!(ui.text().contains("of an older picture nothing is known"), "{}", ui.text());
-    // An answer that comes late is not about it.
+    assert!(ui.text().contains(messages::OLDER_RENDER), "{}", ui.text());
+    // A late reply does not refer to the older render.
     let picked = Picked { pixel: [3, 4], thing: None, color: None };
     ui.worker(WorkerEvent::Picked { generation: 1, picked: Box::new(picked) });
     assert!(!ui.text().contains("pixel 3, 4"), "{}", ui.text());
     ui.press('b');
-    assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest one is asked");
+    assert!(asks(&ui.key(KeyPress::special(KeyCode::Enter))), "the newest render is queried");
 }
 
 #[test]
-fn the_settings_of_the_newest_are_not_told_of_it() {
+fn settings_of_the_newest_are_not_shown() {
     let mut ui = older();
     let keys = line(&mut ui, 39);
     assert!(!line(&mut ui, 0).contains("view normal") && !keys.contains("hard"), "{}", ui.text());
@@ -56,24 +57,24 @@ fn the_settings_of_the_newest_are_not_told_of_it() {
     ui.press('i');
     ui.finish(RED);
     ui.press('n');
-    assert!(line(&mut ui, 0).contains("view normal"), "that of this one: {}", ui.text());
+    assert!(line(&mut ui, 0).contains("view normal"), "the view of this entry: {}", ui.text());
     assert!(line(&mut ui, 39).contains("n N older, newer"), "{}", ui.text());
 }
 
 #[test]
-fn the_image_that_w_writes_meanwhile_is_the_newest_and_is_called_so() {
+fn w_writes_the_newest_image() {
     let mut ui = older();
     ui.press('w');
-    assert!(ui.text().contains("writing the newest image, not the one that is shown"), "{}", ui.text());
+    assert!(ui.text().contains(messages::WRITING_NEWEST), "{}", ui.text());
     let generation = ui.state.request.generation;
     ui.worker(WorkerEvent::WriteDone { generation, paths: vec!["ow.png".into()] });
-    let words = "wrote ow.png: the newest picture, not the one that is shown";
-    assert!(ui.text().contains(words), "{}", ui.text());
+    let words = format!("wrote ow.png{}", messages::WROTE_NEWEST);
+    assert!(ui.text().contains(&words), "{}", ui.text());
 }
 
 #[test]
-fn the_camera_that_c_writes_meanwhile_is_that_of_the_newest_and_is_called_so() {
-    // The save is often noticed before the answer comes, and leads to the newest picture.
+fn c_keeps_the_newest_camera() {
+    // The save is often noticed before the reply arrives, and leads to the newest render.
     for (is_own, is_noticed) in [(true, false), (false, false), (true, true)] {
         let mut ui = older();
         ui.press('b');
@@ -87,13 +88,13 @@ fn the_camera_that_c_writes_meanwhile_is_that_of_the_newest_and_is_called_so() {
         let kept = Kept { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
         let generation = ui.state.request.generation;
         ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
-        let words = "that of the newest picture, not of the one that was shown";
+        let words = messages::OF_NEWEST_RENDER.trim_end();
         assert!(ui.text().contains(words), "{}", ui.text());
     }
 }
 
 #[test]
-fn the_newest_goes_on_and_says_how_far_it_is() {
+fn newest_render_shows_its_progress() {
     let mut ui = older();
     ui.press('b');
     ui.press('r');
@@ -110,37 +111,37 @@ fn the_newest_goes_on_and_says_how_far_it_is() {
     });
     ui.worker(WorkerEvent::Progress { generation, progress: progress(0.25, Some(3.0)) });
     ui.press('n');
-    let words = "picture 2 of 3, 0 s ago  newest 25 %  ETA 3.0 s";
-    assert!(line(&mut ui, 0).contains(words), "{}", ui.text());
+    let words = format!("{}, 0 s ago  newest 25 %  ETA 3.0 s", messages::render_of(2, 3));
+    assert!(line(&mut ui, 0).contains(&words), "{}", ui.text());
     ui.press('m');
     ui.press('N');
     ui.press('n');
-    // The strip marks a picture whose render was stopped.
+    // The history marks a stopped render.
     ui.press('s');
     ui.finish(BLUE);
-    assert!(ui.text().contains("unfinished;"), "{}", ui.text());
-    assert_eq!(ui.text().matches("unfinished").count(), 1, "{}", ui.text());
+    assert!(ui.text().contains(&format!("{}:", messages::STOPPED)), "{}", ui.text());
+    assert_eq!(ui.text().matches(messages::STOPPED).count(), 1, "{}", ui.text());
 }
 
 #[test]
-fn its_age_goes_on_in_the_one_place_that_tells_it() {
+fn age_is_shown_once_and_updated() {
     let mut ui = older();
     ui.wait(3000);
-    assert!(line(&mut ui, 0).contains("picture 1 of 2, 3 s ago"), "{}", ui.text());
+    assert!(line(&mut ui, 0).contains(&format!("{}, 3 s ago", messages::render_of(1, 2))), "{}", ui.text());
     assert!(!ui.text().contains("0 s ago") && ui.text().contains("N newer"), "{}", ui.text());
-    assert!(ui.state.next_tick().is_some(), "it is drawn again");
+    assert!(ui.state.next_tick().is_some(), "it is redrawn");
 }
 
 #[test]
-fn the_time_of_a_save_goes_with_its_picture() {
+fn time_of_a_save_belongs_to_its_image() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.finish(BLUE);
     let generation = ui.state.request.generation;
     ui.event(Event::Shown { generation });
-    assert!(ui.text().contains("saved → seen"), "{}", ui.text());
+    assert!(ui.state.saving.first_change.is_some(), "{}", ui.text());
     ui.press('s');
     ui.finish(RED);
-    assert!(!ui.text().contains("saved → seen"), "no save made this one: {}", ui.text());
+    assert!(ui.state.saving.first_change.is_none(), "not made by a save: {}", ui.text());
 }

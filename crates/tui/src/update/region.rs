@@ -1,7 +1,7 @@
 //! The region of the image that is rendered first.
 
+use super::notices::{prompt, say};
 use super::request::render;
-use super::say::{prompt, say};
 use crate::event::Effect;
 use crate::messages;
 use crate::pipeline::protocol::{Section, Spot};
