@@ -123,6 +123,22 @@ fn parts_in_any_order_equal_one_render() {
     }
 }
 
+#[test]
+fn merged_images_name_the_scene_as_renders_do() {
+    let dir = room_dir();
+    for folder in ["a", "b", "out"] {
+        fs::create_dir(dir.path(folder)).expect("made");
+    }
+    for ending in ["png", "exr"] {
+        let call = "room.toml --once --progress none --samples 2";
+        dir.expect(&format!("{call} -o out/one.{ending}"), 0);
+        dir.expect(&format!("{call} -o a/1.part --shard 1/2"), 0);
+        dir.expect(&format!("{call} -o b/2.part --shard 2/2"), 0);
+        dir.expect(&format!("merge out/two.{ending} a/1.part b/2.part --progress none"), 0);
+        assert!(dir.bytes(&format!("out/one.{ending}")) == dir.bytes(&format!("out/two.{ending}")), "{ending}");
+    }
+}
+
 /// Checks that tiles stop at different sample counts: otherwise the `error` case would test nothing.
 #[test]
 fn noise_target_stops_some_tiles_early() {
