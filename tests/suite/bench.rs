@@ -4,9 +4,10 @@ use std::fs;
 use std::os::unix::fs::symlink;
 
 use glimt::scene::SCENE_NOT_FOUND;
+use nix::errno::Errno;
 use serde_json::Value;
 
-use super::test_dir::TestDir;
+use super::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
 /// A ball on a floor under an area light: few pixels, some indirect light.
 const SCENE: &str = r#"[render]
@@ -70,11 +71,7 @@ fn bench_measures_a_scene_end_to_end() {
     let (stdout, stderr) =
         bench(&dir, &format!("box.toml {SMALL} --csv a.csv --json a.json --plot a.svg"), 0);
     assert_eq!(stderr, "");
-    assert!(
-        stdout
-            .starts_with("box.toml, 24×16 pixels, 3 seeds\nreferences: path, 2 × 64 samples (16 × the most)"),
-        "{stdout}"
-    );
+    assert_mentions(&stdout, &["box.toml", "24×16", "3 seeds", "2 × 64 samples", "16 ×"]);
     for method in ["path ", "whitted photons ", "whitted "] {
         assert!(
             stdout.lines().filter(|line| line.starts_with(method) && !line.contains(':')).count() >= 2,
@@ -94,7 +91,7 @@ fn bench_measures_a_scene_end_to_end() {
     let svg = String::from_utf8(dir.bytes("a.svg")).expect("UTF-8");
     let plot = roxmltree::Document::parse(&svg).expect("XML");
     let said: Vec<_> = plot.descendants().filter_map(|node| node.text()).collect();
-    assert!(said.iter().any(|text| text.contains("whitted photons, slope")), "{said:?}");
+    assert!(said.iter().any(|text| text.starts_with("whitted photons")), "{said:?}");
     let seeds: Vec<u64> = (1..=3).chain(4..=6).collect();
     let steps = results["scenes"][0]["methods"][0]["steps"].as_array().expect("steps");
     let used = steps.iter().flat_map(|step| step["pictures"].as_array().expect("pictures"));
@@ -139,10 +136,9 @@ fn baseline_compares_with_an_older_run() {
     let line = format!("box.toml {SMALL} --integrator path");
     bench(&dir, &format!("{line} --json old.json"), 0);
     let (stdout, _) = bench(&dir, &format!("{line} --baseline old.json"), 0);
-    assert!(stdout.contains("against old.json, with 95 % confidence:"), "{stdout}");
-    assert!(stdout.contains("box.toml, path: error × 1.000 (1.000 to 1.000): the same"), "{stdout}");
+    assert_mentions(&stdout, &["old.json", "95 %", "box.toml, path", "× 1.000", "(1.000 to 1.000)"]);
     let (stdout, _) = bench(&dir, &format!("{line} --clamp 0.01 --baseline old.json"), 0);
-    assert!(stdout.contains("nothing of old.json can be compared"), "another method: {stdout}");
+    assert!(mentions(&stdout, "old.json") && !mentions(&stdout, "error ×"), "another method: {stdout}");
     let (stdout, _) = bench(
         &dir,
         &format!("{line} --set render.max_depth=1 --set render.shadow_samples=64 --baseline old.json"),
@@ -151,16 +147,9 @@ fn baseline_compares_with_an_older_run() {
     assert!(stdout.contains(": error × 0."), "less light has less noise: {stdout}");
     dir.write("odd.json", "{}");
     let (_, stderr) = bench(&dir, &format!("{line} --baseline odd.json"), 2);
-    assert!(
-        stderr.starts_with("error: odd.json is no baseline: ")
-            && stderr.contains("`glimt bench --json FILE` wrote"),
-        "{stderr}"
-    );
-    assert!(
-        bench(&dir, &format!("{line} --baseline none.json"), 2)
-            .1
-            .starts_with("error: cannot read none.json: ")
-    );
+    assert_mentions(&stderr, &["error: odd.json", "bench --json FILE"]);
+    let (_, stderr) = bench(&dir, &format!("{line} --baseline none.json"), 2);
+    assert_mentions(&stderr, &["none.json", &system_error(Errno::ENOENT)]);
 }
 
 #[test]
@@ -202,10 +191,8 @@ fn all_scenes_are_checked_before_measuring() {
     std::os::unix::fs::symlink("skin.ppm", dir.path("a.svg")).expect("a link");
     let (stdout, stderr) = bench(&dir, &format!("box.toml skin.toml {SMALL} --plot a.svg --force"), 2);
     assert_eq!(stdout, "");
-    assert!(
-        stderr.starts_with("error: cannot write a.svg: it is a file that skin.toml is made of"),
-        "{stderr}"
-    );
+    assert_mentions(&stderr, &["a.svg", "skin.toml"]);
+    assert_eq!(dir.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
 }
 
 #[test]
@@ -218,24 +205,19 @@ fn references_set_the_size_and_one_warns() {
     }
     let line = "box.toml --samples 1,4 --seeds 3 --integrator path --progress none --reference r8.exr";
     let (two, _) = bench(&dir, &format!("{line} --reference r9.exr"), 0);
-    assert!(
-        two.starts_with("box.toml, 12×8 pixels, 3 seeds\nreferences: r8.exr and r9.exr, noise "),
-        "{two}"
-    );
+    assert_mentions(&two, &["box.toml", "12×8", "3 seeds", "r8.exr", "r9.exr"]);
     let (one, _) = bench(&dir, line, 0);
-    assert!(one.contains("\nreference: r8.exr, alone: its own noise is read as error\n"), "{one}");
+    let reference = |text: &str| text.lines().nth(1).expect("a second line").to_owned();
+    assert!(mentions(&reference(&one), "r8.exr") && reference(&one) != reference(&two), "{one}");
     let (_, stderr) = bench(&dir, &format!("{line} --csv r8.exr"), 2);
     assert_eq!(
         stderr,
         "error: cannot write r8.exr: it is a reference of this call; name another file with --csv FILE\n"
     );
     let (_, stderr) = bench(&dir, "box.toml --reference none.exr", 2);
-    assert!(stderr.contains("cannot read none.exr"), "{stderr}");
-    assert!(
-        bench(&dir, "box.toml ball.toml --reference r8.exr", 2)
-            .1
-            .contains("--reference belongs to one scene")
-    );
+    assert_mentions(&stderr, &["none.exr", &system_error(Errno::ENOENT)]);
+    let (_, stderr) = bench(&dir, "box.toml ball.toml --reference r8.exr", 2);
+    assert_mentions(&stderr, &["--reference"]);
 }
 
 #[test]
@@ -246,43 +228,28 @@ fn outputs_never_replace_inputs_or_each_other() {
     dir.write("skin.toml", format!("{textured}\n[textures.skin]\nfile = \"skin.ppm\"\n"));
     symlink("box.toml", dir.path("link.csv")).expect("a link");
     symlink("skin.ppm", dir.path("skin.csv")).expect("a link");
-    for (line, words) in [
-        (
-            "box.toml --csv box.toml",
-            "cannot write box.toml: it is a scene of this call; name another file with --csv FILE",
-        ),
-        ("box.toml --csv link.csv", "cannot write link.csv: it is a scene of this call"),
-        (
-            "box.toml --csv a.json --json ./a.json",
-            "cannot write ./a.json: it is the file of --csv; name another file with --json FILE",
-        ),
-        ("box.toml --plot a.png", "cannot write a.png: the plot is an SVG; use a name that ends in .svg"),
-        (
-            "skin.toml --force --csv skin.csv",
-            "cannot write skin.csv: it is a file that skin.toml is made of; name another file",
-        ),
+    for (line, facts) in [
+        ("box.toml --csv box.toml", &["box.toml", "scene", "--csv FILE"][..]),
+        ("box.toml --csv link.csv", &["link.csv", "scene", "--csv FILE"]),
+        ("box.toml --csv a.json --json ./a.json", &["./a.json", "--csv", "--json FILE"]),
+        ("box.toml --plot a.png", &["a.png", "SVG", ".svg"]),
+        ("skin.toml --force --csv skin.csv", &["skin.csv", "skin.toml"]),
     ] {
         let (_, stderr) = bench(&dir, &format!("{line} {SMALL}"), 2);
-        assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
+        assert_mentions(&stderr, facts);
     }
     assert_eq!(dir.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
     // If a file name is missing, the option takes the next word.
-    for (line, words) in [
-        (
-            "--csv ball.toml",
-            "the file of this name is not a table that glimt wrote; name another file with --csv FILE",
-        ),
-        (
-            "--json ball.toml box.toml",
-            "the file of this name is not a file of results that glimt wrote; name another",
-        ),
+    for (line, facts) in [
+        ("--csv ball.toml", ["ball.toml", "table", "--csv FILE"]),
+        ("--json ball.toml box.toml", ["ball.toml", "results", "--json FILE"]),
     ] {
         let (_, stderr) = bench(&dir, &format!("{line} {SMALL}"), 2);
-        assert!(stderr.starts_with("error: cannot write ball.toml: ") && stderr.contains(words), "{stderr}");
+        assert_mentions(&stderr, &facts);
     }
     assert_eq!(dir.bytes("ball.toml"), super::test_dir::SCENE.as_bytes());
     let (_, stderr) = bench(&dir, "box.toml --csv none/a.csv", 1);
-    assert!(stderr.contains("the directory none does not exist"), "{stderr}");
+    assert!(mentions(&stderr, "none") && !dir.path("none").exists(), "{stderr}");
 }
 
 #[test]
@@ -292,7 +259,7 @@ fn one_write_failure_keeps_other_outputs() {
     let line =
         "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache --progress none";
     let (_, stderr) = bench(&dir, &format!("{line} --csv full.csv --json a.json --plot a.svg"), 1);
-    assert!(stderr.starts_with("error: cannot write full.csv: no space left on device"), "{stderr}");
+    assert_mentions(&stderr, &["full.csv", &system_error(Errno::ENOSPC)]);
     assert!(stderr.lines().count() == 1 && errors(&json(&dir, "a.json")).len() == 1, "{stderr}");
     assert!(dir.path("a.svg").is_file());
     // Results replace earlier results, whatever their names.
@@ -322,18 +289,18 @@ fn bench_reports_wrong_calls() {
     dir.write("wrong.toml", SCENE.replace("radius = 0.5", "radius = -1"));
     let (_, stderr) = bench(&dir, "wrong.toml", 2);
     assert!(stderr.contains("wrong.toml:13:"), "{stderr}");
-    for (line, words) in [
-        ("none.toml", SCENE_NOT_FOUND),
-        ("box.toml box.toml", "box.toml is given twice"),
-        ("box.toml --samples 0", "expected a whole number from 1 to 4294967295"),
-        ("box.toml --samples 1 --time 1", "cannot be used with"),
-        ("box.toml --seeds 0", "expected a whole number from 1 to 1000"),
-        ("box.toml --within 0", "expected a number of seconds above 0"),
-        ("box.toml --integrator paths", "paths"),
-        ("box.toml --seed 4294967290", "--seed 4294967290 is too large"),
+    for (line, facts) in [
+        ("none.toml", &["none.toml", SCENE_NOT_FOUND][..]),
+        ("box.toml box.toml", &["box.toml", "twice"]),
+        ("box.toml --samples 0", &["--samples", "1", "4294967295"]),
+        ("box.toml --samples 1 --time 1", &["--samples", "--time"]),
+        ("box.toml --seeds 0", &["--seeds", "1", "1000"]),
+        ("box.toml --within 0", &["--within", "seconds", "0"]),
+        ("box.toml --integrator paths", &["paths"]),
+        ("box.toml --seed 4294967290", &["--seed 4294967290"]),
     ] {
         let (_, stderr) = bench(&dir, line, 2);
-        assert!(stderr.contains(words), "{line}: {stderr}");
+        assert_mentions(&stderr, facts);
     }
 }
 
@@ -342,12 +309,8 @@ fn progress_is_plain_lines_or_json_objects() {
     let dir = box_dir();
     let line = "box.toml --samples 1 --reference-samples 8 --seeds 1 --integrator path --no-cache";
     let (stdout, plain) = bench(&dir, line, 0);
-    assert!(
-        plain.contains("box.toml: references of 24×16 pixels in ")
-            && plain.contains("box.toml: path, 1 sample: "),
-        "{plain}"
-    );
-    assert!(stdout.contains("too few seeds to tell a bias"), "{stdout}");
+    assert_mentions(&plain, &["box.toml", "24×16", "path, 1 sample"]);
+    assert!(mentions(&stdout, "seeds") && !stdout.contains("BIAS"), "{stdout}");
     let (_, objects) = bench(&dir, &format!("{line} --progress json --csv a.csv"), 0);
     let objects: Vec<Value> = objects.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let events: Vec<_> = objects.iter().map(|object| object["event"].as_str().expect("a name")).collect();

@@ -23,14 +23,14 @@ const SIZES: [(Rect, PreviewSize); 3] = [
 const FILM: u32 = 320;
 
 /// Renders one scene after another.
-struct Studio {
+struct PreviewRenderer {
     handle: Handle,
     preview: PreviewSize,
     generation: u64,
     folder: tempfile::TempDir,
 }
 
-impl Studio {
+impl PreviewRenderer {
     fn new(preview: PreviewSize) -> Self {
         let handle = glimt::pipeline::start(0).expect("a worker");
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
@@ -84,13 +84,13 @@ impl Studio {
 }
 
 /// A painter and the terminal it writes to.
-struct Screen {
+struct PaintedScreen {
     window: Rect,
     painter: Painter,
     terminal: vt100::Parser,
 }
 
-impl Screen {
+impl PaintedScreen {
     fn new(window: Rect) -> Self {
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let terminal = vt100::Parser::new(side(window.height), side(window.width), 0);
@@ -171,7 +171,7 @@ fn changed(a: &Picture, b: &Picture) -> usize {
 }
 
 /// Shows a whole render on the screen; returns the number of bytes for its first preview and for all.
-fn through(screen: &mut Screen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
+fn through(screen: &mut PaintedScreen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();
     let (last, _) = pictures.last().expect("pictures");
@@ -194,7 +194,8 @@ fn renders_and_edits_stay_within_byte_budgets() {
     for ((window, preview), (name, from, to)) in SIZES.iter().flat_map(|size| edits.map(|edit| (*size, edit)))
     {
         let place = format!("{name}, {to}, at {}×{}", window.width, window.height);
-        let (before, mut studio, mut screen) = (scene(name), Studio::new(preview), Screen::new(window));
+        let (before, mut studio, mut screen) =
+            (scene(name), PreviewRenderer::new(preview), PaintedScreen::new(window));
         assert!(before.contains(from), "{name} has no `{from}`");
         let old = studio.pictures(&before);
         let new = studio.pictures(&before.replace(from, to));

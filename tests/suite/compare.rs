@@ -4,9 +4,10 @@ use std::fs;
 use std::os::unix::fs::symlink;
 
 use image::{DynamicImage, ImageBuffer, Rgb, Rgb32FImage, RgbImage};
+use nix::errno::Errno;
 use serde_json::Value;
 
-use super::test_dir::TestDir;
+use super::test_dir::{TestDir, assert_mentions, mentions, system_error};
 
 const SIZE: (u32, u32) = (24, 16);
 
@@ -129,7 +130,7 @@ fn table_lists_every_metric() {
     let stdout = String::from_utf8(output.stdout).expect("UTF-8");
     assert!(output.stderr.is_empty());
     let lines: Vec<_> = stdout.lines().collect();
-    assert_eq!(lines[0], "a.png against the reference b.png, 24×16 pixels");
+    assert_mentions(lines[0], &["a.png", "b.png", "24×16"]);
     for (line, start) in lines[2..].iter().zip([
         "RMSE               0.0667884",
         "relMSE              0.421550",
@@ -141,8 +142,8 @@ fn table_lists_every_metric() {
     ]) {
         assert!(line.starts_with(start), "{stdout}");
     }
-    assert!(lines[5].ends_with("at pixel (17, 12)"), "{stdout}");
-    assert!(lines.last().expect("a line").starts_with("Better is: PSNR higher"), "{stdout}");
+    assert!(lines[5].ends_with("(17, 12)"), "{stdout}");
+    assert_mentions(lines.last().expect("a line"), &["PSNR", "SSIM"]);
 }
 
 #[test]
@@ -166,7 +167,7 @@ fn threshold_decides_the_exit_code() {
     assert_eq!((object["ssim"].as_f64(), object["flip"].as_f64()), (Some(1.0), Some(0.0)));
     for wrong in ["-1", "nan", "inf", "much"] {
         let stderr = dir.expect(&format!("compare a.png b.png --max-relmse {wrong}"), 2);
-        assert!(stderr.contains("expected a number that is not below 0"), "{stderr}");
+        assert_mentions(&stderr, &["--max-relmse", wrong]);
     }
 }
 
@@ -176,18 +177,17 @@ fn compare_reports_wrong_calls_and_files() {
     dir.expect("compare a.png", 2);
     dir.expect("compare a.png b.png a.ppm", 2);
     let both = dir.expect("compare none.png ball.toml", 2);
-    assert!(both.starts_with("error: cannot read none.png: no such file or directory\n"), "{both}");
-    assert!(both.contains("error: ball.toml: its content is no image that can be read"), "{both}");
+    assert_mentions(&both, &["none.png", &system_error(Errno::ENOENT), "ball.toml"]);
+    assert_eq!(both.matches("error: ").count(), 2, "{both}");
     let whole = dir.bytes("a.png");
     dir.write("cut.png", &whole[..whole.len() / 2]);
-    assert!(dir.expect("compare cut.png b.png", 2).contains("cut.png: "));
+    assert_mentions(&dir.expect("compare cut.png b.png", 2), &["cut.png"]);
     dir.write("empty.exr", "");
-    assert!(dir.expect("compare a.png empty.exr", 2).contains("empty.exr: the file is empty"));
-    assert!(dir.expect("compare . /dev/zero", 2).contains("it is a folder"));
+    assert_mentions(&dir.expect("compare a.png empty.exr", 2), &["empty.exr", "empty"]);
+    assert_mentions(&dir.expect("compare . /dev/zero", 2), &["folder", "/dev/zero", "device"]);
     RgbImage::new(3, 5).save(dir.path("small.png")).expect("written");
     let sizes = dir.expect("compare small.png b.png", 2);
-    assert!(sizes.starts_with("error: small.png has 3×5 pixels and b.png 24×16: "), "{sizes}");
-    assert!(sizes.contains("--width"), "the way out: {sizes}");
+    assert_mentions(&sizes, &["small.png", "3×5", "b.png", "24×16", "--width"]);
 }
 
 #[test]
@@ -201,9 +201,7 @@ fn non_finite_values_are_counted_and_located() {
     };
     floats(spoilt).save(dir.path("nan.exr")).expect("written");
     let said = dir.expect("compare nan.exr b.exr --diff d.png", 2);
-    let words = "error: nan.exr: 4 of its values are NaN and 1 infinite, the first at pixel (5, 3), \
-                 counted from (0, 0) at the top left, in blue: ";
-    assert!(said.starts_with(words), "{said}");
+    assert_mentions(&said, &["nan.exr", "4", "1 infinite", "(5, 3)", "blue"]);
     assert!(!dir.path("d.png").exists());
 }
 
@@ -213,23 +211,23 @@ fn comparing_a_file_with_itself_warns() {
     symlink("a.png", dir.path("link.png")).expect("a link");
     let (object, stderr) = json(&dir, "a.png a.png", 0);
     assert_eq!(object["rmse"].as_f64(), Some(0.0));
-    assert!(stderr.starts_with("warning: a.png is given twice: there is no error"), "{stderr}");
+    assert!(stderr.starts_with("warning: a.png ") && !mentions(&stderr, "link.png"), "{stderr}");
     let (_, stderr) = json(&dir, "link.png a.png", 0);
-    assert!(stderr.starts_with("warning: link.png and a.png are one file: "), "{stderr}");
+    assert!(mentions(&stderr, "warning: link.png") && mentions(&stderr, "a.png"), "{stderr}");
 }
 
 #[test]
 fn diff_writes_the_error_image() {
     let dir = dir();
     let (_, stderr) = json(&dir, "a.exr b.exr --diff d.exr", 0);
-    assert_eq!(stderr, "wrote d.exr (|a - b| of each channel, linear)\n");
+    assert!(mentions(&stderr, "d.exr") && stderr.lines().count() == 1, "{stderr}");
     let diff = image::open(dir.path("d.exr")).expect("an EXR").into_rgb32f();
     let expected =
         floats(|x, y, c| (f32::from(judged(x, y, c)) / 64.0 - f32::from(reference(x, y, c)) / 64.0).abs());
     assert_eq!(diff, expected);
     for ending in ["png", "jpg", "ppm"] {
         let (_, stderr) = json(&dir, &format!("a.png b.png --diff d.{ending}"), 0);
-        assert!(stderr.starts_with(&format!("wrote d.{ending} (FLIP of each pixel: black 0, ")), "{stderr}");
+        assert_mentions(&stderr, &[&format!("d.{ending}"), "FLIP"]);
         let diff = image::open(dir.path(&format!("d.{ending}"))).expect("a picture");
         assert_eq!((diff.width(), diff.height()), SIZE);
     }
@@ -247,17 +245,11 @@ fn diff_never_replaces_a_compared_image() {
     symlink("a.png", dir.path("soft.png")).expect("a link");
     fs::hard_link(dir.path("b.png"), dir.path("hard.png")).expect("a link");
     let before = [dir.bytes("a.png"), dir.bytes("b.png")];
-    for (target, words) in [
-        (
-            "a.png",
-            "error: cannot write a.png: it is one of the pictures compared; name another file with --diff FILE",
-        ),
-        ("./b.png", "error: cannot write ./b.png: it is b.png, one of the pictures compared"),
-        ("soft.png", "error: cannot write soft.png: it is a.png, one of"),
-        ("hard.png", "error: cannot write hard.png: it is b.png, one of"),
-    ] {
+    for (target, compared) in
+        [("a.png", "a.png"), ("./b.png", "b.png"), ("soft.png", "a.png"), ("hard.png", "b.png")]
+    {
         let stderr = dir.expect(&format!("compare a.png b.png --diff {target}"), 2);
-        assert!(stderr.starts_with(words), "{stderr}");
+        assert_mentions(&stderr, &[target, compared, "--diff FILE"]);
     }
     assert_eq!([dir.bytes("a.png"), dir.bytes("b.png")], before);
 }
@@ -266,9 +258,9 @@ fn diff_never_replaces_a_compared_image() {
 fn diff_target_is_checked_first() {
     let dir = dir();
     let stderr = dir.expect("compare a.png b.png --diff d.gif", 2);
-    assert!(stderr.contains(".gif is not a format that glimt writes"), "{stderr}");
+    assert_mentions(&stderr, &[".gif", ".png"]);
     let stderr = dir.expect("compare none.png b.png --diff none/d.png", 1);
-    assert!(stderr.contains("the directory none does not exist"), "{stderr}");
+    assert!(mentions(&stderr, "none") && !mentions(&stderr, "none.png"), "{stderr}");
 }
 
 #[test]

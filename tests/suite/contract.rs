@@ -21,10 +21,10 @@ enum Promise {
 use Promise::{Default, Other, Required};
 
 /// Name, example, promise.
-type Key = (&'static str, &'static str, Promise);
+type KeyContract = (&'static str, &'static str, Promise);
 
 /// The tables with all their keys and example values.
-const TABLES: &[(&str, &[Key])] = &[
+const TABLES: &[(&str, &[KeyContract])] = &[
     (
         "[render]",
         &[

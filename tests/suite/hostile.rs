@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command as Process;
 use std::time::{Duration, Instant};
 
-use super::test_dir::{SCENE, TestDir};
+use super::test_dir::{SCENE, TestDir, assert_mentions};
 
 /// Time limit for a rejection: it takes milliseconds, while reading on would take minutes.
 const AT_ONCE: Duration = Duration::from_secs(10);
@@ -122,7 +122,7 @@ fn asset_must_be_a_regular_file() {
                 dir.write("scene.toml", text);
                 let stderr = refused(&dir, "scene.toml", words);
                 assert!(stderr.contains(&file), "{what}: {stderr}");
-                assert!(stderr.contains(&format!("scene.toml:{place}")), "{what} {ending}: {stderr}");
+                assert_mentions(&stderr, &[&format!("scene.toml:{place}")]);
             }
         }
     }

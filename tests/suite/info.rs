@@ -1,8 +1,9 @@
 //! `glimt info`: how an image was made.
 
+use nix::errno::Errno;
 use serde_json::Value;
 
-use super::test_dir::TestDir;
+use super::test_dir::{TestDir, assert_mentions, system_error};
 
 const SMALL: &str = "--once --width 16 --height 12 --samples 2";
 
@@ -52,7 +53,7 @@ fn info_lists_layers_and_parts() {
     assert!(text.contains("B G R depth.Z samples.X") && text.contains("depth,samples"), "{text}");
     dir.expect(&format!("ball.toml {SMALL} -o 2.part --shard 2/3"), 0);
     let text = info(&dir, "2.part", 0);
-    assert!(text.starts_with("2.part: part 2 of 3, 16×12\n") && text.contains("integrator"), "{text}");
+    assert_mentions(&text, &["2.part", "2 of 3", "16×12", "integrator"]);
 }
 
 #[test]
@@ -61,9 +62,9 @@ fn info_on_foreign_images_and_other_files() {
     let text = info(&dir, "ball.toml", 2);
     assert!(text.is_empty());
     let stderr = String::from_utf8(dir.run("info none.png").stderr).expect("UTF-8");
-    assert!(stderr.contains("cannot read none.png: no such file"), "{stderr}");
+    assert_mentions(&stderr, &["none.png", &system_error(Errno::ENOENT)]);
     dir.write("d.png", foreign());
-    assert!(info(&dir, "d.png", 1).contains("unknown: the file does not tell"));
+    assert_mentions(&info(&dir, "d.png", 1), &["unknown"]);
     // Names and values may contain characters that a terminal interprets.
     dir.write("e.ppm", b"P6\n# glimt:scene: a\x1b[31mred\n1 1\n255\nabc");
     assert!(!info(&dir, "e.ppm", 1).contains('\u{1b}'));

@@ -7,7 +7,7 @@ use glimt::system::machine::ProcessIdentity;
 use serde_json::json;
 
 use super::gltf::Glb;
-use super::test_dir::{SCENE, TestDir};
+use super::test_dir::{SCENE, TestDir, assert_mentions, mentions};
 
 /// An image that glimt did not write: one red texel.
 const PHOTOGRAPH: &[u8] = b"P6\n1 1\n255\n\xff\x20\x20";
@@ -154,9 +154,9 @@ fn every_kind_of_input_is_kept() {
         ("camera.txt", "orbiter"),
         ("deep/one.obj", "mesh"),
         // Rejected as a report before the mesh is read.
-        ("deep/materials.json", "is not a report that glimt wrote"),
-        ("deep/one.mtl", "is not a report that glimt wrote"),
-        ("deep/wood.ppm", "is not a report that glimt wrote"),
+        ("deep/materials.json", "report"),
+        ("deep/one.mtl", "report"),
+        ("deep/wood.ppm", "report"),
         // This file does not exist yet, and is read once it does.
         ("deep/gone.mtl", "one.obj"),
     ] {
@@ -207,7 +207,7 @@ fn images_named_by_a_gltf_file_are_kept() {
         ] {
             let stderr =
                 refused(&dir, &format!("{call} {ENDLESS} --force -o {picture}"), &[picture, "cannot write"]);
-            assert!(stderr.contains("m.glb") || stderr.contains("the scene names"), "{call}: {stderr}");
+            assert!(stderr.contains("m.glb") || stderr.contains("scene"), "{call}: {stderr}");
         }
     }
 }
@@ -248,7 +248,7 @@ fn outputs_and_report_must_differ() {
         let names = line.split_whitespace().filter(|word| !word.starts_with('-'));
         let names: Vec<&str> = names.skip_while(|name| *name == "b.png").collect();
         let stderr = refused(&dir, &format!("ball.toml {ENDLESS} {line}"), &names);
-        assert!(stderr.contains("one file") || stderr.contains("is given twice"), "{line}: {stderr}");
+        assert_eq!(stderr.matches("error: ").count(), 1, "{line}: {stderr}");
     }
     dir.expect("ball.toml --once -o o/a.png -o a.png --report o/p/a.png.json", 0);
 }
@@ -339,12 +339,12 @@ fn new_never_overwrites() {
     fs::create_dir(dir.path("folder.toml")).expect("a folder");
     for name in ["dangling.toml", "link.toml", "folder.toml", "deep/../ball.toml", "ball.toml"] {
         fs::create_dir_all(dir.path("deep")).expect("a folder");
-        refused(&dir, &format!("new {name}"), &[name, "left as it is"]);
+        refused(&dir, &format!("new {name}"), &["error: ", name]);
     }
     assert!(!dir.path("nowhere.toml").exists());
     assert!(fs::symlink_metadata(dir.path("dangling.toml")).expect("a link").is_symlink());
     let stderr = dir.expect("new dangling.toml", 2);
-    assert!(stderr.contains("symbolic link"), "{stderr}");
+    assert!(!dir.path("nowhere.toml").exists() && mentions(&stderr, "dangling.toml"), "{stderr}");
 }
 
 #[test]
@@ -354,11 +354,7 @@ fn environment_map_is_never_an_output() {
     for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
         dir.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
         dir.write("sky.ppm", PHOTOGRAPH);
-        let said = refused(
-            &dir,
-            &format!("{name} {ENDLESS} -o sky.ppm"),
-            &["sky.ppm", "the map of the environment"],
-        );
+        let said = refused(&dir, &format!("{name} {ENDLESS} -o sky.ppm"), &["sky.ppm", "environment"]);
         assert!(said.contains(name), "{said}");
         let checked = dir.glimt(&format!("check {name}")).output().expect("it runs");
         let counted = String::from_utf8_lossy(&checked.stdout).into_owned();
@@ -367,7 +363,7 @@ fn environment_map_is_never_an_output() {
     }
     fs::remove_file(dir.path("sky.ppm")).expect("removed");
     let missing = dir.expect("check lit.toml", 2);
-    assert!(missing.contains("there is no file") && missing.contains("sky.ppm"), "{missing}");
+    assert_mentions(&missing, &["error", "sky.ppm", "lit.toml"]);
     dir.write("sky.ppm", "P6 no picture");
     for call in ["check lit.toml", "check dark.toml", "lit.toml --once"] {
         assert!(dir.expect(call, 2).contains("sky.ppm"), "{call}");

@@ -11,10 +11,10 @@ use glimt::math::Vec3;
 
 use crate::test_dir::TestDir;
 
-/// Random numbers in [0, 1).
-struct Random(u64);
+/// UnitRandom numbers in [0, 1).
+struct UnitRandom(u64);
 
-impl Random {
+impl UnitRandom {
     fn next(&mut self) -> f32 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 40) as f32) / (1_u64 << 24) as f32
@@ -84,7 +84,7 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
 /// Number of rays from inside a closed mesh that escape; each is aimed at a vertex or an edge.
 fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: InstructionSet) -> usize {
     let tree = tree(mesh).with(instructions);
-    let mut random = Random(rays as u64);
+    let mut random = UnitRandom(rays as u64);
     let mut leaks = 0;
     for i in 0..rays / PACKET_SIZE {
         let origin = random.vector() * 0.5 * scale + offset;
@@ -113,7 +113,7 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
 fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -> usize {
     let count = mesh.triangles.len() as u32;
     let tree = KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
-    let mut random = Random(rays as u64 + 1);
+    let mut random = UnitRandom(rays as u64 + 1);
     let mut leaks = 0;
     for i in 0..rays {
         let origin = random.vector() * 0.5 * scale + offset;
@@ -198,7 +198,7 @@ fn boxes_show_no_speckle_from_any_side() {
     for side in [1, 3] {
         let mesh = boxes(side);
         let middle = Vec3::splat((side - 1) as f32 * 0.75 + 0.5);
-        let mut random = Random(u64::from(side));
+        let mut random = UnitRandom(u64::from(side));
         for instructions in InstructionSet::ALL {
             let tree = tree(&mesh).with(instructions);
             for view in 0..1000 {
@@ -264,7 +264,7 @@ fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
 /// precision cannot separate from the origin are decided in double precision.
 #[test]
 fn hits_next_to_the_ray_origin_are_found() {
-    let mut random = Random(91);
+    let mut random = UnitRandom(91);
     let slivers: Vec<[Vec3; 3]> = (0..2000)
         .map(|_| {
             let (at, along) = (random.vector() * 4.0, random.vector());

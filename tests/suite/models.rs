@@ -1,6 +1,6 @@
 //! Models in every file format, with their own materials.
 
-use super::test_dir::TestDir;
+use super::test_dir::{TestDir, assert_mentions, mentions};
 
 const CAMERA: &str = "[render]\nwidth = 24\nheight = 18\nsamples = 4\n[camera]\nposition = [0.3, 0.4, 3]\nlook_at = [0.5, 0.4, 0]\n\
                       [[light]]\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n[environment]\ncolor = [0.3, 0.4, 0.5]\n";
@@ -160,11 +160,7 @@ fn anisotropy_without_uv_warns() {
     };
     dir.write("brushed.toml", scene("0.5"));
     let stderr = dir.expect("brushed.toml --once -o a.exr", 0);
-    let message = "a.stl has no texture coordinates: the `anisotropy` of \"m\" has no direction there";
-    assert!(
-        stderr.contains("warning") && stderr.contains(message) && stderr.contains("brushed.toml:"),
-        "{stderr}"
-    );
+    assert_mentions(&stderr, &["warning", "a.stl", "`anisotropy`", "\"m\"", "brushed.toml"]);
     dir.write("plain.toml", scene("0.0"));
     assert!(!dir.expect("plain.toml --once -o b.exr", 0).contains("anisotropy"));
 }
@@ -180,20 +176,13 @@ fn missing_mtl_images_name_their_material() {
     dir.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
     dir.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
     let missing = dir.expect("a.toml --once -o a.png", 2);
-    assert!(
-        missing.contains("lost.png") && missing.contains("the material \"brick\" of a.obj names it"),
-        "{missing}"
-    );
+    assert_mentions(&missing, &["lost.png", "\"brick\"", "a.obj"]);
     dir.write("lost.png", "no picture");
     let wrong = dir.expect("a.toml --once -o a.png", 2);
-    assert!(
-        wrong.contains("lost.png") && wrong.contains("the material \"brick\" of a.obj names it"),
-        "{wrong}"
-    );
+    assert_mentions(&wrong, &["lost.png", "\"brick\"", "a.obj"]);
     dir.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
-    let grey = dir.expect("a.toml --once -o a.png", 0);
-    assert!(grey.contains("heights.pgm is grey: heights in place of the normals of \"brick\""), "{grey}");
-    assert!(grey.contains("it bends nothing"), "{grey}");
+    let gray = dir.expect("a.toml --once -o a.png", 0);
+    assert_mentions(&gray, &["warning", "heights.pgm", "normals", "\"brick\""]);
 }
 
 #[test]
@@ -210,16 +199,13 @@ fn unsuitable_images_warn() {
         );
         dir.expect("a.toml --once -o a.png", 0)
     };
-    let grey = said("normal_map = \"t\"");
-    assert!(
-        grey.contains("heights.pgm is grey: heights in place of the normals of \"m\"; it tilts"),
-        "{grey}"
-    );
+    let gray = said("normal_map = \"t\"");
+    assert_mentions(&gray, &["warning", "heights.pgm", "normals", "\"m\""]);
     let alpha = said("opacity = { texture = \"t\", channel = \"a\" }");
-    assert!(alpha.contains("heights.pgm has no alpha below 1: `channel = \"a\"` is 1 everywhere"), "{alpha}");
+    assert_mentions(&alpha, &["warning", "heights.pgm", "alpha", "`channel = \"a\"`"]);
     for fine in ["bump = \"t\"", "opacity = { texture = \"t\" }", "diffuse = { texture = \"t\" }"] {
         let said = said(fine);
-        assert!(!said.contains("is grey") && !said.contains("alpha"), "{said}");
+        assert!(!mentions(&said, "heights.pgm"), "{said}");
     }
 }
 
@@ -240,10 +226,9 @@ fn ineffective_mesh_keys_warn() {
         dir.expect("a.toml --once -o a.png", 0)
     };
     let textured = warnings("diffuse = { texture = \"dots\" }", "");
-    let message = "a.off has no texture coordinates: each triangle shows half of the textures of \"m\"";
-    assert!(textured.contains(message), "{textured}");
+    assert_mentions(&textured, &["warning", "a.off", "texture coordinates", "\"m\""]);
     let metal = warnings("type = \"metal\"\nelement = \"gold\"", "vertex_colors = true");
-    assert!(metal.contains("`vertex_colors` changes nothing: \"m\" has no colour"), "{metal}");
+    assert_mentions(&metal, &["warning", "`vertex_colors`", "\"m\""]);
     let matte = warnings("diffuse = 0.5", "vertex_colors = true");
-    assert!(!matte.contains("changes nothing") && !matte.contains("coordinates"), "{matte}");
+    assert!(!mentions(&matte, "warning"), "{matte}");
 }

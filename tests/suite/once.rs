@@ -4,14 +4,16 @@ use std::fs;
 use std::process::{Command as Process, Stdio};
 use std::time::{Duration, Instant};
 
-use super::test_dir::{SCENE, TestDir};
+use nix::errno::Errno;
+
+use super::test_dir::{SCENE, TestDir, assert_mentions, mentions, system_error};
 
 #[test]
 fn once_renders_and_names_the_image() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once", 0);
     let last = stderr.lines().last().expect("a line");
-    assert!(last.starts_with("wrote ball.png (32×24, 2 samples, "), "{last}");
+    assert_mentions(last, &["ball.png", "32×24", "2 samples"]);
     assert!(dir.path("ball.png").is_file());
     for stage in ["parse", "accel", "render", "write"] {
         assert!(stderr.lines().any(|line| line.starts_with(stage)), "{stage}: {stderr}");
@@ -25,7 +27,7 @@ fn outputs_resolve_to_scene_or_working_directory() {
     dir.write("scenes/own.toml", SCENE.replace("[render]", "[render]\noutput = \"out/own.ppm\""));
     dir.write("scenes/none.toml", SCENE);
     let stderr = dir.expect("scenes/own.toml --once", 0);
-    assert!(stderr.contains("wrote scenes/out/own.ppm (32×24"), "{stderr}");
+    assert_mentions(&stderr, &["scenes/out/own.ppm", "32×24"]);
     assert!(dir.path("scenes/out/own.ppm").is_file());
     dir.expect("scenes/none.toml --once", 0);
     assert!(dir.path("none.png").is_file());
@@ -201,9 +203,7 @@ fn call_errors_do_not_point_into_the_scene() {
 fn ineffective_options_warn() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once --dof on --photons on --integrator path --progress none", 0);
-    let warning = "warning: --dof on has no effect: the scene's camera is a pinhole";
-    assert!(stderr.contains(warning) && stderr.contains("--photons on has no effect"), "{stderr}");
-    assert!(stderr.ends_with("2 warnings\n"), "{stderr}");
+    assert_mentions(&stderr, &["warning: --dof on", "warning: --photons on", "2 warnings"]);
     let stderr = dir.expect("ball.toml --once --dof on --progress json", 0);
     let done = stderr.lines().last().map(serde_json::from_str::<serde_json::Value>);
     let done = done.expect("a line").expect("JSON");
@@ -220,7 +220,7 @@ fn missing_generated_mesh_names_its_command() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/million.toml");
     dir.write("million.toml", fs::read_to_string(scene).expect("a scene"));
     let stderr = dir.expect("check million.toml", 2);
-    assert!(stderr.contains("there is no file") && stderr.contains("glimt-assets -- million"), "{stderr}");
+    assert_mentions(&stderr, &["million.toml", "glimt-assets -- million"]);
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn wrong_call_exits_2() {
         ("ball.toml --once --accel octree", "kdtree"),
         ("ball.toml --once -o a.xyz", "a.xyz"),
         ("ball.toml --once --crop 0,0,33,1", "32×24"),
-        ("ball.toml --once --bit-depth 16 -o a.jpg", "cannot hold 16 bits"),
+        ("ball.toml --once --bit-depth 16 -o a.jpg", "JPEG"),
         ("ball.toml --nonsense", "--nonsense"),
         ("--once", "SCENE"),
     ] {
@@ -261,8 +261,9 @@ fn each_failed_output_has_a_line() {
     let stderr = dir.expect("ball.toml --once --progress none -o a.png -o c.png -o b.ppm", 1);
     let lines: Vec<&str> = stderr.lines().collect();
     assert_eq!(lines.len(), 2, "{stderr}");
-    assert!(lines[0].starts_with("error: cannot write a.png: no space left"), "{stderr}");
-    assert!(lines[1].starts_with("error: cannot write b.ppm: no space left"), "{stderr}");
+    for (line, name) in lines.into_iter().zip(["a.png", "b.ppm"]) {
+        assert_mentions(line, &["error", name, &system_error(Errno::ENOSPC)]);
+    }
     assert!(dir.path("c.png").is_file());
 }
 
@@ -296,7 +297,7 @@ fn check_counts_objects_and_triangles() {
     let output = dir.run("check ball.toml");
     assert_eq!(output.status.code(), Some(0));
     let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(stdout.starts_with("ok: ball.toml: 1 object, 0 triangles"), "{stdout}");
+    assert_mentions(&stdout, &["ok: ball.toml", "1 object", "0 triangles"]);
     dir.write("ball.toml", SCENE.replace("\"ball\"", "\"bal\""));
     let stderr = dir.expect("check ball.toml", 2);
     assert!(stderr.contains("bal") && stderr.contains("ball.toml:17:"), "{stderr}");
@@ -310,9 +311,9 @@ fn check_warns_about_unlit_meshes() {
     let scene = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[mesh]]\nfile = \"a.obj\"\n";
     dir.write("dark.toml", scene);
     let said = |name: &str| String::from_utf8_lossy(&dir.run(&format!("check {name}")).stderr).into_owned();
-    assert!(said("dark.toml").contains("nothing lights this scene"), "{}", said("dark.toml"));
+    assert_mentions(&said("dark.toml"), &["warning", "dark.toml"]);
     dir.write("lit.toml", format!("{scene}[[light]]\n"));
-    assert!(!said("lit.toml").contains("nothing lights"), "{}", said("lit.toml"));
+    assert!(!mentions(&said("lit.toml"), "warning"), "{}", said("lit.toml"));
 }
 
 #[test]
@@ -329,24 +330,23 @@ fn check_handles_200000_shapes() {
     dir.write("many.toml", text);
     let output = dir.run("check many.toml");
     let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(stdout.starts_with("ok: many.toml: 200000 objects, 0 triangles"), "{stdout}");
+    assert_mentions(&stdout, &["ok: many.toml", "200000 objects", "0 triangles"]);
 }
 
 #[test]
 fn new_scene_renders_and_never_overwrites() {
     let dir = TestDir::new();
     let stderr = dir.expect("new fresh.toml", 0);
-    assert!(stderr.contains("glimt fresh.toml"), "{stderr}");
+    assert_mentions(&stderr, &["fresh.toml", "glimt fresh.toml"]);
     dir.expect("fresh.toml --once --width 16 --height 12 --samples 1", 0);
     let stderr = dir.expect("new ball.toml", 2);
-    assert!(stderr.contains("ball.toml exists"), "{stderr}");
+    assert_mentions(&stderr, &["error: ball.toml"]);
     assert_eq!(fs::read_to_string(dir.path("ball.toml")).expect("there"), SCENE);
     dir.expect("new nowhere/x.toml", 1);
     // A folder with that name exists, however the path is written.
     fs::create_dir(dir.path("sub")).expect("a folder");
     for name in ["sub", "sub/"] {
-        let stderr = dir.expect(&format!("new {name}"), 2);
-        assert_eq!(stderr, format!("error: {name} exists already, and is left as it is\n"));
+        assert_mentions(&dir.expect(&format!("new {name}"), 2), &[&format!("error: {name}")]);
     }
 }
 
@@ -364,7 +364,8 @@ fn unprintable_names_are_not_suggested() {
         let output = dir.glimt("new").arg(OsStr::from_bytes(&picture)).output().expect("it runs");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.contains("is the name of a picture; scenes end in .toml\n"), "{said}");
+        assert!(said.starts_with("error: ") && said.trim_end().ends_with(".toml"), "{said}");
+        assert!(!said.contains("glimt "), "{said}");
     }
 }
 
@@ -428,8 +429,8 @@ fn signal_during_the_write_reports_the_image() {
     let code = child.wait().expect("it ends").code();
     // Without checkpoints nothing else saves the samples.
     assert!(dir.path("out.png").exists(), "{code:?}: {}", said());
-    assert!(said().contains("wrote out.png"), "{}", said());
-    assert!(code == Some(0) || said().ends_with("ended by SIGTERM: the picture was written\n"), "{}", said());
+    assert_mentions(&said(), &["out.png"]);
+    assert!(code == Some(0) || mentions(&said(), "SIGTERM"), "{}", said());
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Files on disk: written completely or not at all, whatever happens.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
@@ -8,6 +9,9 @@ use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use glimt::output::{OutputError, check_target, write::atomic};
+use nix::errno::Errno;
+
+use super::test_dir::{assert_mentions, system_error};
 
 /// Environment variable with a path that makes a test run in a child process.
 const CHILD: &str = "GLIMT_TEST_CHILD";
@@ -96,7 +100,7 @@ fn link_loop_is_an_error() {
     symlink("b.png", directory.path().join("a.png")).expect("a link");
     symlink("a.png", directory.path().join("b.png")).expect("a link");
     let message = refused(&directory.path().join("a.png"));
-    assert!(message.contains("a.png: its symbolic links form a loop; "), "{message}");
+    assert_mentions(&message, &["a.png", &system_error(Errno::ELOOP)]);
 }
 
 #[test]
@@ -106,11 +110,7 @@ fn full_disk_is_an_error() {
     symlink("/dev/full", &path).expect("a link");
     check_target(&path).expect("only the write fails");
     let message = atomic(&path, b"picture").expect_err("nothing fits").to_string();
-    let expected = format!(
-        "cannot write {}: no space left on device; free some space or choose another place",
-        path.display()
-    );
-    assert_eq!(message, expected);
+    assert_mentions(&message, &[&path.display().to_string(), &system_error(Errno::ENOSPC)]);
     assert!(fs::symlink_metadata("/dev/full").is_ok(), "the device still exists");
 }
 
@@ -129,8 +129,10 @@ fn pipe_needs_a_reader() {
     let directory = scratch();
     let path = directory.path().join("pipe.png");
     nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
-    let message = atomic(&path, b"picture").expect_err("nobody reads").to_string();
-    assert!(message.contains("nobody reads this pipe"), "{message}");
+    let error = atomic(&path, b"picture").expect_err("without a reader");
+    let is_unconnected =
+        matches!(&error, OutputError::File { source, .. } if source.kind() == ErrorKind::NotConnected);
+    assert!(is_unconnected, "{error:?}");
     // More bytes than a pipe holds; `cat` has started once the pipe can be opened for writing.
     let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i * 7 % 251) as u8).collect();
     let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
@@ -170,16 +172,15 @@ fn impossible_targets_are_reported() {
     fs::create_dir(inside("dir.png")).expect("a directory");
     fs::write(inside("file"), "").expect("a file");
     let message = refused(&inside("missing/out.png"));
-    let expected = format!("the directory {} does not exist; create it or", inside("missing").display());
-    assert!(message.contains(&expected), "{message}");
+    assert_mentions(&message, &[&format!("directory {}", inside("missing").display())]);
     for name in ["dir.png", "dir.png/", "new.png/"] {
         let message = refused(&inside(name));
-        assert!(message.contains("it is a directory; name a file in it"), "{message}");
+        assert_mentions(&message, &[&inside(name).display().to_string(), "a directory"]);
     }
     let message = refused(&inside("file/out.png"));
-    assert!(message.contains("a part of its path is a file, not a folder"), "{message}");
+    assert_mentions(&message, &[&system_error(Errno::ENOTDIR)]);
     let message = refused(&inside(&format!("{}.png", "n".repeat(300))));
-    assert!(message.ends_with("file name too long; choose a shorter name"), "{message}");
+    assert_mentions(&message, &[&system_error(Errno::ENAMETOOLONG)]);
     assert_eq!(names(directory.path()), ["dir.png", "file"]);
 }
 
@@ -196,12 +197,9 @@ fn longest_possible_name_is_written() {
 fn missing_permission_is_an_error() {
     if let Some(directory) = child_path() {
         let message = refused(&directory.join("closed/out.png"));
-        assert!(
-            message.ends_with("permission denied; allow writing there or choose another place"),
-            "{message}"
-        );
+        assert_mentions(&message, &[&system_error(Errno::EACCES)]);
         let message = refused(&directory.join("open/protected.png"));
-        assert!(message.contains("protected.png: permission denied; "), "{message}");
+        assert_mentions(&message, &["protected.png", &system_error(Errno::EACCES)]);
         atomic(&directory.join("open/other.png"), b"new").expect("written");
         return;
     }
@@ -249,7 +247,7 @@ fn file_size_limit_is_an_error() {
     if let Some(path) = child_path() {
         let error = atomic(&path, &vec![1; 1 << 20]).expect_err("larger than the limit");
         assert!(matches!(&error, OutputError::File { .. }));
-        assert!(error.to_string().contains("file too large; raise the limit"), "{error}");
+        assert_mentions(&error.to_string(), &[&system_error(Errno::EFBIG), "ulimit -f"]);
         return;
     }
     let directory = scratch();

@@ -8,7 +8,7 @@ use std::process::Command;
 use glimt::cli::environment::VARIABLES;
 
 use crate::terminal::pty::Folder;
-use crate::test_dir::TestDir;
+use crate::test_dir::{TestDir, assert_mentions, mentions};
 
 /// Bash's completions for a line, whose last word is being typed.
 fn in_bash(dir: &TestDir, line: &str) -> Vec<String> {
@@ -61,7 +61,7 @@ fn installed_shells_complete_lines() {
     let output = output.expect("python3");
     let said = String::from_utf8(output.stdout).expect("UTF-8");
     println!("{said}");
-    assert!(output.status.success() && said.contains("bash: 32 of 32 lines complete"), "{said}");
+    assert!(output.status.success() && mentions(&said, "bash: 32 of 32"), "{said}");
 }
 
 #[test]
@@ -79,9 +79,7 @@ fn every_shell_has_a_completion_script() {
         assert!(output.status.success() && script.contains(mark), "{shell}: {script}");
         assert!(script.contains("GLIMT_COMPLETE"), "{shell}: {script}");
     }
-    assert!(
-        dir.expect("completions tcsh", 2).contains("[possible values: bash, zsh, fish, powershell, elvish]")
-    );
+    assert_mentions(&dir.expect("completions tcsh", 2), &["bash, zsh, fish, powershell, elvish"]);
 }
 
 #[test]
@@ -105,14 +103,14 @@ fn manual_lists_commands_options_and_variables() {
     let check = page("man check");
     assert!(check.contains(".TH glimt-check 1") && check.contains("--set"), "{check}");
     assert!(!check.contains("--checkpoint"));
-    assert!(dir.expect("man chekc", 2).contains("did you mean `check`?"));
+    assert_mentions(&dir.expect("man chekc", 2), &["`check`"]);
 }
 
 #[test]
 fn call_without_arguments_suggests_a_scene() {
     let dir = TestDir::new();
     let said = dir.expect("", 2);
-    assert!(said.contains("glimt new ball.toml") && said.contains("glimt -h"), "{said}");
+    assert_mentions(&said, &["glimt new ball.toml", "glimt -h"]);
     assert!(said.lines().count() < 10, "{said}");
     // Only an option is a call without its scene.
     assert!(dir.expect("--once", 2).contains("<SCENE>"));

@@ -3,10 +3,11 @@
 use std::fs;
 use std::path::Path;
 
+use nix::errno::Errno;
 use serde_json::json;
 
 use super::gltf::{Glb, cube, cubes};
-use super::test_dir::{PROGRAM, TestDir, assert_mentions, mentions};
+use super::test_dir::{PROGRAM, TestDir, assert_mentions, mentions, system_error};
 
 const SMALL: &str = "--once --force --width 48 --height 36 --samples 4 --error 0";
 
@@ -71,9 +72,9 @@ fn model_is_framed_from_every_side() {
         assert_eq!(bottom - top > right - left, is_high, "{comment}");
     }
     let stderr = dir.expect(&format!("ball.toml {SMALL} --up z"), 2);
-    assert!(stderr.contains("--up is for models"), "{stderr}");
+    assert_mentions(&stderr, &["--up"]);
     let stderr = dir.expect(&format!("ball.toml {SMALL} --from top"), 2);
-    assert!(stderr.contains("--from is for models"), "{stderr}");
+    assert_mentions(&stderr, &["--from"]);
 }
 
 /// A shape in a z-up format looks the same as in a y-up format.
@@ -104,7 +105,7 @@ fn import_renders_like_the_model() {
     dir.write("cubes.glb", cubes(&checker()));
     let shown = picture(&dir, "cubes.glb");
     let said = dir.expect("import cubes.glb -o scene.toml", 0);
-    assert!(said.contains("wrote scene.toml, and 2 files in scene_files"), "{said}");
+    assert_mentions(&said, &["scene.toml", "2 files", "scene_files"]);
     assert_eq!(picture(&dir, "scene.toml"), shown);
     let text = fs::read_to_string(dir.path("scene.toml")).expect("a scene");
     for words in [
@@ -119,11 +120,12 @@ fn import_renders_like_the_model() {
     assert_eq!(dir.bytes("scene_files/checks.png"), checker());
     // Import never overwrites an existing file or folder.
     let said = dir.expect("import cubes.glb -o scene.toml", 2);
-    assert!(said.contains("scene.toml exists already, and is left as it is"), "{said}");
+    assert_mentions(&said, &["scene.toml", "-o"]);
+    assert_eq!(fs::read_to_string(dir.path("scene.toml")).expect("a scene"), text);
     fs::remove_file(dir.path("scene.toml")).expect("removed");
-    assert!(dir.expect("import cubes.glb -o scene.toml", 2).contains("scene_files exists already"));
-    assert!(dir.expect("import ball.toml -o b.toml", 2).contains(".gltf or .glb"));
-    assert!(dir.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
+    assert_mentions(&dir.expect("import cubes.glb -o scene.toml", 2), &["scene_files", "-o"]);
+    assert_mentions(&dir.expect("import ball.toml -o b.toml", 2), &["ball.toml", ".gltf", ".glb"]);
+    assert_mentions(&dir.expect("import cubes.glb -o b.png", 2), &["b.png", ".toml"]);
 }
 
 /// The color uses the first set of coordinates, the emission the second, as in exports with light maps.
@@ -155,14 +157,13 @@ fn both_uv_sets_are_imported() {
     assert!(!said.contains("approximation"), "{said}");
     assert_eq!(picture(&dir, "a.toml"), of_both);
     let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
-    assert!(text.contains("[textures.checks_2]\nfile = \"a_files/checks.png\"\nuv = 1\n"), "{text}");
+    let texture = "[textures.checks_2]\nfile = \"a_files/checks.png\"\nuv = 1\n";
+    assert!(text.contains(texture), "{text}");
     // A mesh without a second set warns, and uses the first.
     dir.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
     dir.write("b.toml", text.replace("a_files/cube.ply", "b.obj"));
     let said = dir.expect(&format!("b.toml {SMALL} -o b.exr"), 0);
-    let words =
-        "b.obj has no second set of texture coordinates: \"checks_2\" of \"material\" takes the first";
-    assert!(said.contains(words), "{said}");
+    assert_mentions(&said, &["warning", "b.obj", "\"checks_2\"", "\"material\""]);
 }
 
 /// A cube with an image in a file of this name.
@@ -204,7 +205,7 @@ fn failed_import_leaves_nothing() {
     dir.write("cubes.glb", cubes(&checker()));
     // The scene's name is already taken by a dangling link.
     std::os::unix::fs::symlink("nowhere", dir.path("taken.toml")).expect("a link");
-    assert!(dir.expect("import cubes.glb -o taken.toml", 2).contains("taken.toml exists already"));
+    assert_mentions(&dir.expect("import cubes.glb -o taken.toml", 2), &["taken.toml", "-o"]);
     assert!(!dir.path("taken_files").exists());
     // No file may exceed a block of 512 bytes.
     let shell = std::process::Command::new("sh")
@@ -214,7 +215,7 @@ fn failed_import_leaves_nothing() {
         .expect("it runs");
     let said = String::from_utf8_lossy(&shell.stderr).into_owned();
     assert_eq!(shell.status.code(), Some(1), "{said}");
-    assert!(said.contains("cannot write full_files/") && said.contains("file too large"), "{said}");
+    assert_mentions(&said, &["full_files", &system_error(Errno::EFBIG)]);
     assert!(!dir.path("full.toml").exists() && !dir.path("full_files").exists());
     dir.expect("import cubes.glb -o full.toml", 0);
 }
@@ -223,32 +224,33 @@ fn failed_import_leaves_nothing() {
 #[test]
 fn out_of_range_numbers_name_the_gltf_node() {
     let dir = TestDir::new();
-    let lamp = |intensity: f64| {
+    let light = |intensity: f64| {
         json!({"nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 5, 0]}],
             "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "name": "sun", "intensity": intensity}]}}})
     };
-    for (mut model, words) in [
-        (json!({"nodes": [{"mesh": 0, "scale": [1e30, 1e30, 1e30]}]}), "nodes[0]: its scale has 1e30"),
-        (json!({"nodes": [{"mesh": 0, "translation": [0, -1e30, 0]}]}), "nodes[0]: its translation has 1e30"),
+    for (mut model, facts) in [
+        (json!({"nodes": [{"mesh": 0, "scale": [1e30, 1e30, 1e30]}]}), ["nodes[0]", "scale", "1e30"]),
+        (json!({"nodes": [{"mesh": 0, "translation": [0, -1e30, 0]}]}), ["nodes[0]", "translation", "1e30"]),
         (
             json!({"scenes": [{"nodes": [1]}], "nodes": [{"mesh": 0, "scale": [1e9, 1e9, 1e9]}, {"children": [0], "scale": [1e9, 1e9, 1e9]}]}),
-            "nodes[0]: with those of its ancestors, its placement has 1e18",
+            ["nodes[0]", "ancestors", "1e18"],
         ),
-        (lamp(1e30), "nodes[1]: its light lights[0] \"sun\" has intensity 1e30"),
-        (lamp(1e300), "nodes[1]: its light lights[0] \"sun\" has intensity 1e300"),
+        (light(1e30), ["nodes[1]", "lights[0] \"sun\"", "1e30"]),
+        (light(1e300), ["nodes[1]", "lights[0] \"sun\"", "1e300"]),
     ] {
         let mut glb = Glb::default();
         model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
         dir.write("a.glb", glb.finish(model));
         let said = dir.expect("import a.glb --strict", 2);
-        assert!(said.contains(words), "{words}: {said}");
-        assert!(!dir.path("a.toml").exists() && !dir.path("a_files").exists(), "{words}");
+        assert_mentions(&said, &facts);
+        assert!(!dir.path("a.toml").exists() && !dir.path("a_files").exists(), "{said}");
         let said = dir.expect(&format!("a.glb {SMALL}"), 2);
-        assert!(said.contains(words) && !said.contains("a.glb:"), "{words}: {said}");
+        assert_mentions(&said, &facts);
+        assert!(!said.contains("a.glb:"), "{said}");
     }
     // A model that can be read is a scene that passes the check.
     let mut glb = Glb::default();
-    let mut model = lamp(9e14);
+    let mut model = light(9e14);
     model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
     dir.write("a.glb", glb.finish(model));
     dir.expect("import a.glb", 0);
@@ -263,7 +265,7 @@ fn impossible_counts_are_reported_exactly() {
     let text = glb.finish_text(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}]}));
     dir.write("a.gltf", text.replace("\"count\":36", "\"count\":1000000000000"));
     let said = dir.expect("import a.gltf", 2);
-    assert!(said.contains("1000000000000 corners"), "{said}");
+    assert_mentions(&said, &["1000000000000"]);
 }
 
 /// Whenever it is killed, an import leaves either the whole scene or nothing visible, and the next one succeeds.
@@ -320,7 +322,7 @@ fn interrupted_import_leaves_nothing() {
             fs::remove_file(dir.path("o.toml")).expect("removed");
             fs::remove_dir_all(dir.path("o_files")).expect("removed");
         } else if matches!(signal, Signal::SIGINT | Signal::SIGTERM) {
-            assert!(said.contains(&format!("ended by {signal}: nothing was written")), "{said}");
+            assert_mentions(&said, &[signal.as_str()]);
         }
         assert_eq!(hidden(), usize::from(signal == Signal::SIGKILL && !is_whole), "{signal}");
     }
@@ -339,21 +341,14 @@ fn strict_import_rejects_approximations() {
         "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [{"extensions": extensions}], "animations": [{}]
     })));
     let said = dir.expect("import a.glb -o strict.toml --strict", 1);
-    assert!(
-        said.contains("materials[0]: its sheen is left out") && said.contains("2 approximations"),
-        "{said}"
-    );
+    assert_mentions(&said, &["materials[0]", "sheen", "2 approximations", "--strict"]);
     assert!(!dir.path("strict.toml").exists() && !dir.path("strict_files").exists());
     dir.expect("import a.glb", 0);
     let text = fs::read_to_string(dir.path("a.toml")).expect("a scene");
-    assert!(
-        text.contains(
-            "# animations: 1 left out: the model is shown at rest\n# materials[0]: its sheen is left out\n"
-        ),
-        "{text}"
-    );
+    let comments: String = text.lines().filter(|line| line.starts_with("# ")).collect();
+    assert_mentions(&comments, &["animations: 1", "materials[0]", "sheen"]);
     let said = dir.expect(&format!("a.glb {SMALL}"), 0);
-    assert!(said.contains("its sheen is left out"), "{said}");
+    assert_mentions(&said, &["materials[0]", "sheen"]);
 }
 
 #[test]
@@ -398,13 +393,9 @@ fn only_polished_models_are_clamped() {
             })),
         );
         let said = dir.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
-        assert_eq!(
-            said.contains("the light that its polished surfaces throw on others is cut"),
-            is_polished,
-            "{said}"
-        );
-        assert_eq!(said.contains("--clamp 0 shows all of it"), is_polished, "{said}");
-        assert!(!dir.expect(&format!("a.glb {SMALL} -o a.exr --clamp 0"), 0).contains("cut"));
+        assert_eq!(mentions(&said, "--clamp 0"), is_polished, "{said}");
+        assert_eq!(mentions(&said, "clamp"), is_polished, "{said}");
+        assert!(!dir.expect(&format!("a.glb {SMALL} -o a.exr --clamp 0"), 0).contains("clamp"));
     }
     dir.write("box.obj", box_of([1, 1, 1]));
     assert!(!dir.expect(&format!("box.obj {SMALL} -o a.exr"), 0).contains("clamp"));
@@ -425,38 +416,33 @@ fn scene_can_use_a_gltf_file_or_a_part() {
         String::from_utf8([output.stdout, output.stderr].concat()).expect("UTF-8")
     };
     let whole = check("[[mesh]]\nfile = \"cubes.glb\"\n", 0);
-    assert!(
-        whole.contains("1 object, 24 triangles") && whole.contains("the textures of 1 of its materials"),
-        "{whole}"
-    );
+    assert_mentions(&whole, &["1 object", "24 triangles"]);
     let part = "[[mesh]]\nfile = \"cubes.glb\"\npart = 0\n";
     let material = "material = \"m\"\n[materials.m]\ndiffuse = { texture = \"t\" }\n[textures.t]\nfile = \"cubes.glb\"\n";
     let said = check(&format!("{part}{material}image = 0\n"), 0);
-    assert!(said.contains("1 object, 12 triangles, 1 texture"), "{said}");
-    assert!(check(part, 2).contains("has no materials of its own"));
-    assert!(check(&format!("{part}{material}"), 2).contains("unknown file ending .glb"));
-    assert!(
-        check(&format!("{part}{material}image = 7\n"), 2).contains("images[7] does not exist: there are 1")
-    );
+    assert_mentions(&said, &["1 object", "12 triangles", "1 texture"]);
+    assert_mentions(&check(part, 2), &["scene.toml", "`material`"]);
+    assert_mentions(&check(&format!("{part}{material}"), 2), &["scene.toml", ".glb"]);
+    assert_mentions(&check(&format!("{part}{material}image = 7\n"), 2), &["images[7]", "1"]);
     let said = check(&format!("{}{material}image = 0\n", part.replace('0', "9")), 2);
-    assert!(said.contains("part[9] does not exist: there are 1"), "{said}");
+    assert_mentions(&said, &["part[9]", "1"]);
     let said = check("[[mesh]]\nfile = \"a.obj\"\npart = 0\n", 2);
-    assert!(said.contains("no file"), "{said}");
+    assert_mentions(&said, &["a.obj"]);
 }
 
 #[test]
 fn broken_model_errors_have_a_position() {
     let dir = TestDir::new();
-    for (file, content, words) in [
-        ("a.glb", &b"glTF\x02\0\0\0\0\0\0\0"[..], "it has no JSON"),
+    for (file, content, fact) in [
+        ("a.glb", &b"glTF\x02\0\0\0\0\0\0\0"[..], "JSON"),
         ("a.gltf", b"{", "line 1: column 1"),
-        ("a.gltf", b"{\"asset\": {\"version\": \"2.0\"}}", "its scene shows no faces"),
+        ("a.gltf", b"{\"asset\": {\"version\": \"2.0\"}}", "faces"),
         ("a.stl", b"solid a\nvertex", "line 2"),
         ("a.ply", b"ply\n", "a.ply"),
     ] {
         dir.write(file, content);
         let said = dir.expect(&format!("{file} {SMALL}"), 2);
-        assert!(said.contains(words) && said.contains(file), "{file}: {said}");
+        assert_mentions(&said, &[file, fact]);
     }
 }
 
@@ -491,10 +477,10 @@ fn damaged_images_are_not_imported() {
     dir.write("a.glb", cubes(&damaged));
     for call in ["check a.glb", "import a.glb"] {
         let said = dir.expect(call, 2);
-        assert!(said.contains("it claims"), "{call}: {said}");
+        assert_mentions(&said, &["images[0]"]);
     }
     let said = dir.expect("import a.glb", 2);
-    assert!(said.contains("a.glb: images[0]: it claims"), "{said}");
+    assert_mentions(&said, &["a.glb", "images[0]"]);
 }
 
 #[test]
@@ -507,20 +493,20 @@ fn unusable_models_are_rejected() {
         };
         dir.write(&format!("far.{ending}"), text);
         let said = dir.expect(&format!("check far.{ending}"), 2);
-        let reach = said.split_once("its coordinates reach to ").map(|(_, rest)| rest);
-        let reach = reach.and_then(|rest| rest.split(',').next()?.parse::<f64>().ok());
-        assert!(reach.is_some_and(|reach| (reach / 1e20 - 1.0).abs() < 1e-6), "{said}");
-        assert!(said.contains("must stay below 1e18") && !said.contains("position"), "{said}");
+        let numbers = said.split([' ', ',', '\n']).filter_map(|word| word.parse::<f64>().ok());
+        assert!({ numbers }.any(|number| (number / 1e20 - 1.0).abs() < 1e-6), "{said}");
+        assert_mentions(&said, &["1e18"]);
+        assert!(!said.contains("position"), "{said}");
     }
     dir.write("a.fbx", "Kaydara FBX Binary");
     let said = dir.expect("check a.fbx", 2);
-    assert!(said.contains("a format that glimt does not read: .fbx"), "{said}");
-    assert!(said.contains(".obj") && said.contains(".glb") && said.contains(".gltf"), "{said}");
+    assert_mentions(&said, &[".fbx", ".obj", ".glb", ".gltf"]);
     let said = dir.expect("check none.stl", 2);
     assert!(!said.contains("glimt new"), "{said}");
     fs::create_dir(dir.path("folder.ply")).expect("a folder");
     let said = dir.expect("check folder.ply", 2);
-    assert!(said.contains("this is a folder, not a model") && !said.contains("scene.toml"), "{said}");
+    assert_mentions(&said, &["folder.ply", "folder", "model"]);
+    assert!(!said.contains("scene.toml"), "{said}");
 }
 
 #[test]
@@ -531,7 +517,7 @@ fn model_errors_show_no_generated_line() {
     // A material file that was not copied with the model.
     for call in [format!("a.obj {SMALL} -o a.png"), "check a.obj".to_owned()] {
         let said = String::from_utf8(dir.run(&call).stderr).expect("UTF-8");
-        assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
+        assert_mentions(&said, &["a.mtl"]);
     }
     dir.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
     let said = dir.expect(&format!("a.obj {SMALL} -o a.png"), 0);
@@ -540,7 +526,7 @@ fn model_errors_show_no_generated_line() {
     assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
     dir.write("nope.png", checker());
     let said = dir.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
-    assert!(said.contains("cannot write nope.png") && !said.contains("a.obj:"), "{said}");
+    assert!(mentions(&said, "nope.png") && !said.contains("a.obj:"), "{said}");
 }
 
 /// The image shows only the ground, which does not reveal the reason.
@@ -549,7 +535,7 @@ fn invisible_model_warns() {
     let dir = TestDir::new();
     let said = |file: &str| {
         let said = dir.expect(&format!("{file} {SMALL} -o a.exr"), 0);
-        (said.matches("nothing of it is seen: its faces have an opacity of 0").count(), said)
+        (said.matches("opacity").count(), said)
     };
     let mut unseen = Vec::new();
     for (material, is_seen) in [
@@ -572,11 +558,7 @@ fn invisible_model_warns() {
         );
         let (count, said) = said("a.glb");
         assert_eq!(count, usize::from(!is_seen), "{material}: {said}");
-        assert_eq!(
-            said.contains("materials[0]: an alpha cutoff above 1 cuts all of it away"),
-            is_beyond,
-            "{said}"
-        );
+        assert_eq!(mentions(&said, "materials[0]"), is_beyond, "{said}");
         if !is_seen {
             unseen.push(dir.bytes("a.exr"));
         }
@@ -630,12 +612,12 @@ fn model_is_shown_without_missing_images() {
             for name in names {
                 assert!(said.contains(name), "{name}: {said}");
             }
-            assert!(said.contains("the material \"q\" of a.obj is shown without it"), "{said}");
+            assert_mentions(&said, &["warning", "\"q\"", "a.obj"]);
             assert!(picture(&dir, "a.obj") == expected, "{maps}{content:?}");
         }
         // It stays an input, and commands that need the whole model fail.
         let said = dir.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
-        assert!(said.contains("cannot write kd.png"), "{said}");
+        assert_mentions(&said, &["kd.png"]);
         assert_eq!(dir.bytes("kd.png"), b"no picture");
         assert!(dir.expect("check a.obj", 2).contains("kd.png"));
     }
@@ -652,22 +634,19 @@ fn model_is_shown_without_missing_images() {
     })));
     assert!(plain(with_image("lost.png")) == bare);
     let said = dir.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
-    assert!(
-        said.contains("lost.png") && said.contains("\"material\" of a.glb is shown without it"),
-        "{said}"
-    );
+    assert_mentions(&said, &["warning", "lost.png", "\"material\"", "a.glb"]);
     assert!(dir.expect("import a.glb", 2).contains("images[0]"));
     assert!(dir.expect("check a.glb", 2).contains("lost.png"));
     dir.write("lost.png", checker());
     assert!(picture(&dir, "a.glb") != bare);
     dir.write("lost.png", "no picture");
     assert!(picture(&dir, "a.glb") == bare);
-    assert!(dir.expect(&format!("a.glb {SMALL} -o lost.png"), 2).contains("cannot write lost.png"));
+    assert_mentions(&dir.expect(&format!("a.glb {SMALL} -o lost.png"), 2), &["lost.png"]);
     let mut damaged = checker();
     damaged.truncate(60);
     dir.write("a.glb", cubes(&damaged));
     let said = dir.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
-    assert!(said.contains("\"paint \"1\"\" of a.glb is shown without it"), "{said}");
+    assert_mentions(&said, &["warning", "\"paint \"1\"\"", "a.glb"]);
 }
 
 #[test]
@@ -689,6 +668,6 @@ fn model_is_never_an_output() {
     dir.write("a.obj", box_of([1, 2, 3]));
     std::os::unix::fs::symlink("a.obj", dir.path("a.png")).expect("a link");
     let said = dir.expect(&format!("a.obj {SMALL} -o a.png"), 2);
-    assert!(said.contains("cannot write a.png: it is a.obj, the model"), "{said}");
+    assert_mentions(&said, &["a.png", "a.obj", "model"]);
     assert!(said.lines().all(|line| line.trim() != "|"), "{said}");
 }

@@ -21,12 +21,12 @@ use std::fmt;
 use std::fs;
 use std::path::PathBuf;
 
-use random::Random;
+use random::FuzzRandom;
 use seeds::{Seed, assets, scenes};
 
-/// Kind of the changed file.
+/// FileKind of the changed file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum FileKind {
     Scene,
     Asset,
 }
@@ -34,7 +34,7 @@ enum Kind {
 /// One file to check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Case {
-    kind: Kind,
+    kind: FileKind,
     seed: u64,
     number: u64,
 }
@@ -47,12 +47,12 @@ impl fmt::Display for Case {
 }
 
 /// The seeds of all cases.
-struct Material {
+struct Corpus {
     scenes: Vec<Seed>,
     assets: Vec<Seed>,
 }
 
-impl Material {
+impl Corpus {
     fn new() -> Self {
         Self { scenes: scenes(), assets: assets() }
     }
@@ -60,10 +60,10 @@ impl Material {
     /// The changed file of a case, named like its original.
     fn make(&self, case: Case) -> Seed {
         let seeds = match case.kind {
-            Kind::Scene => &self.scenes,
-            Kind::Asset => &self.assets,
+            FileKind::Scene => &self.scenes,
+            FileKind::Asset => &self.assets,
         };
-        let mut random = Random::new(case.seed ^ (case.kind as u64) << 32, case.number);
+        let mut random = FuzzRandom::new(case.seed ^ (case.kind as u64) << 32, case.number);
         let seed = random.pick(seeds);
         let other = random.pick(seeds);
         Seed { bytes: change::changed(&seed.bytes, &other.bytes, &mut random), ..seed.clone() }
@@ -89,7 +89,7 @@ fn settle(failures: &[(Case, String)]) {
     }
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("fuzz");
     fs::create_dir_all(&folder).expect("a folder");
-    let material = Material::new();
+    let material = Corpus::new();
     let mut text = String::new();
     for (case, reason) in failures {
         let made = material.make(*case);
@@ -102,29 +102,32 @@ fn settle(failures: &[(Case, String)]) {
 
 #[test]
 fn changed_scenes_are_checked_or_rejected() {
-    settle(&worker::check_all(Kind::Scene, seed(), counts()[0]));
+    settle(&worker::check_all(FileKind::Scene, seed(), counts()[0]));
 }
 
 #[test]
 fn changed_assets_are_checked_or_rejected() {
-    settle(&worker::check_all(Kind::Asset, seed(), counts()[1]));
+    settle(&worker::check_all(FileKind::Asset, seed(), counts()[1]));
 }
 
 #[test]
 fn check_exits_with_0_or_2() {
     let [_, _, count] = counts();
     settle(
-        &[program::check_all(Kind::Scene, seed(), count), program::check_all(Kind::Asset, seed(), count)]
-            .concat(),
+        &[
+            program::check_all(FileKind::Scene, seed(), count),
+            program::check_all(FileKind::Asset, seed(), count),
+        ]
+        .concat(),
     );
 }
 
 #[test]
 fn same_seed_gives_the_same_files() {
-    let (one, other) = (Material::new(), Material::new());
+    let (one, other) = (Corpus::new(), Corpus::new());
     let mut changed = 0;
     for number in 0..100 {
-        for kind in [Kind::Scene, Kind::Asset] {
+        for kind in [FileKind::Scene, FileKind::Asset] {
             let case = Case { kind, seed: 3, number };
             assert_eq!(one.make(case), other.make(case), "{case}");
             changed += usize::from(one.make(case) != one.make(Case { seed: 4, ..case }));

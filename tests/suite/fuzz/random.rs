@@ -1,9 +1,9 @@
 //! Reproducible random numbers.
 
 /// SplitMix64 (Steele, Lea, Flood, *Fast Splittable Pseudorandom Number Generators*, 2014).
-pub(super) struct Random(u64);
+pub(super) struct FuzzRandom(u64);
 
-impl Random {
+impl FuzzRandom {
     /// Creates a separate stream for each pair.
     pub(super) fn new(seed: u64, number: u64) -> Self {
         let mut start = Self(seed);
