@@ -17,7 +17,7 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             File(FILES),
             "",
             Required("\"picture.png\""),
-            "png, jpg, ppm (pgm, pbm), tga, bmp, hdr, exr or webp, or a glTF file with `image`; color or gray; up to 65,536 pixels per side and 2 GiB in memory",
+            "png, jpg, ppm (pgm, pbm), pfm, tga, bmp, hdr, exr or webp, or a glTF file with `image`; color or gray; up to 65,536 pixels per side and 2 GiB in memory",
         ),
         key("image", Whole(0, MOST_WHOLE), "", Absent, "Index into the `images` of a glTF file"),
         key(

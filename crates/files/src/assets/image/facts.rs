@@ -42,6 +42,13 @@ impl Facts {
         self.ignored.push(Ignored { line: None, words: words.into() });
     }
 
+    /// Warns of an animation, whose first frame is used.
+    pub(super) fn warn_of_frames(&mut self, frames: u32) {
+        if frames > 1 {
+            self.warn(format!("it has {frames} frames; only the first is used"));
+        }
+    }
+
     /// Takes the space of an ICC profile; `None` for one that cannot be unpacked.
     pub(super) fn add_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
         match profile.map_or(Err("it is broken".to_owned()), |profile| icc::space(profile, is_gray)) {

@@ -13,13 +13,67 @@ pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Resul
     check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
 }
 
-/// [`check_whole`] of bytes in memory.
+/// Checks bytes in memory: the kind of the file, and as [`check_whole`].
 pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
+    check_kind(bytes)?;
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     match (last([0xff, 0xda]), last([0xff, 0xd9])) {
         (Some(scan), Some(end)) if scan < end => Ok(()),
         _ => Err("the file ends before the image does".to_owned()),
     }
+}
+
+/// Refuses kinds that the decoder does not name as such (ITU-T T.81, table B.1).
+fn check_kind(bytes: &[u8]) -> Result<(), String> {
+    // The data of a frame begins with the bits of a sample.
+    let mut frames = segments(bytes)
+        .filter(|(marker, _)| matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc));
+    let Some((marker, start)) = frames.next() else { return Ok(()) };
+    let kind = match (marker, bytes.get(start)) {
+        (0xc9..=0xcf, _) => "an arithmetic-coded JPEG".to_owned(),
+        (0xc3, _) => "a lossless JPEG".to_owned(),
+        (0xc5..=0xc7, _) => "a hierarchical JPEG".to_owned(),
+        (_, Some(bits)) if *bits != 8 => format!("a JPEG of {bits} bits"),
+        (_, _) => return Ok(()),
+    };
+    Err(format!("it is {kind}; save it as a baseline or progressive JPEG, or as PNG"))
+}
+
+/// Place of the byte by which an Adobe segment says RGB, although a JFIF segment says YCbCr. Readers follow the latter.
+pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
+    const ADOBE: &[u8] = b"Adobe";
+    const TRANSFORM: usize = 11;
+    let find = |marker: u8, name: &[u8]| {
+        let mut named =
+            segments(bytes).filter(|(found, start)| *found == marker && bytes[*start..].starts_with(name));
+        named.next().map(|(_, start)| start)
+    };
+    find(0xe0, b"JFIF\0")?;
+    let transform = find(0xee, ADOBE)? + TRANSFORM;
+    (bytes.get(transform) == Some(&0)).then_some(transform)
+}
+
+/// Makes the Adobe segment say YCbCr if the JFIF segment does.
+pub(super) fn correct_transform(bytes: &mut [u8]) {
+    if let Some(transform) = misleading_transform(bytes) {
+        bytes[transform] = 1;
+    }
+}
+
+/// The segments before the first scan: marker, and the place of its data.
+fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
+    const SCAN: u8 = 0xda;
+    let mut at = 2;
+    std::iter::from_fn(move || {
+        // A marker may follow any number of bytes 0xff.
+        while bytes.get(at..at + 2)? == [0xff, 0xff] {
+            at += 1;
+        }
+        let &[0xff, marker, high, low] = bytes.get(at..)?.first_chunk()? else { return None };
+        let start = at + 4;
+        at += 2 + usize::from(u16::from_be_bytes([high, low]));
+        (marker != SCAN && start <= bytes.len()).then_some((marker, start))
+    })
 }
 
 /// Checks the size: each block of 8 × 8 pixels takes at least one bit, that of its mean.
@@ -29,4 +83,55 @@ pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Resul
         return Err(format!("it claims {width} × {height} pixels, which {file_bytes} bytes cannot hold"));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unread_kinds_are_named() {
+        let file = |marker: u8, bits: u8| {
+            [
+                0xff, 0xd8, 0xff, 0xe0, 0, 4, 1, 2, 0xff, 0xff, marker, 0, 5, bits, 0, 0, 0xff, 0xda, 0, 2,
+                0xff, 0xd9,
+            ]
+        };
+        for (marker, bits) in [(0xc0, 8), (0xc1, 8), (0xc2, 8)] {
+            assert_eq!(check_bytes(&file(marker, bits)), Ok(()), "{marker:x}");
+        }
+        // Huffman tables are not a frame.
+        assert_eq!(check_bytes(&file(0xc4, 1)), Ok(()));
+        let said = |marker, bits| check_bytes(&file(marker, bits)).expect_err("refused");
+        let kinds = [0xc3, 0xc6, 0xc9, 0xca].map(|marker| said(marker, 8));
+        assert!(kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[2] == kinds[3], "{kinds:?}");
+        assert!(said(0xc1, 12).contains("12"));
+        let whole = file(0xc0, 8);
+        for length in 0..whole.len() {
+            assert!(check_bytes(&whole[..length]).is_err(), "{length}");
+        }
+    }
+
+    #[test]
+    fn jfif_comes_before_an_adobe_transform() {
+        let file = |segments: &[&[u8]]| {
+            let mut file = vec![0xff, 0xd8];
+            for segment in segments {
+                file.extend([0xff, segment[0], 0, segment.len() as u8 + 1]);
+                file.extend(&segment[1..]);
+            }
+            file.extend([0xff, 0xda, 0, 2, 0xff, 0xd9]);
+            file
+        };
+        let (jfif, rgb, ycc) =
+            (b"\xe0JFIF\0\x01\x02", b"\xeeAdobe\0d\0\0\0\0\0", b"\xeeAdobe\0d\0\0\0\0\x01");
+        for segments in [&[jfif.as_slice(), rgb][..], &[rgb, jfif]] {
+            let file = file(segments);
+            let at = misleading_transform(&file).expect("both");
+            assert_eq!(file[at - 11..=at], rgb[1..]);
+        }
+        for segments in [&[jfif.as_slice(), ycc][..], &[rgb], &[jfif], &[]] {
+            assert_eq!(misleading_transform(&file(segments)), None);
+        }
+    }
 }

@@ -8,6 +8,7 @@ mod facts;
 mod hdr;
 mod icc;
 mod jpeg;
+mod pfm;
 mod png;
 mod primaries;
 mod space;
@@ -19,6 +20,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ::image::error::LimitErrorKind;
+use ::image::metadata::Orientation;
 use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::contain::contain;
@@ -33,6 +35,7 @@ use counting::Counting;
 use exr::ExrDecoder;
 use facts::{Alpha, Facts, Ignored};
 use hdr::HdrDecoder;
+use pfm::PfmDecoder;
 use png::PngDecoder;
 use space::ColorSpace;
 
@@ -145,7 +148,7 @@ impl Default for ImageLimits {
     }
 }
 
-/// Reads an image: PNG, JPEG, PNM, TGA, BMP, HDR, EXR or WebP, recognised by its first bytes, else by its ending.
+/// Reads an image: PNG, JPEG, PNM, PFM, TGA, BMP, HDR, EXR or WebP, recognised by its first bytes, else by its ending.
 ///
 /// Grey becomes RGB, alpha is left out but for numbers, a camera's orientation tag is followed. Texels that are negative or not finite become 0
 /// (but for [`ImageEncoding::Raw`]). A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is
@@ -393,7 +396,7 @@ impl Source {
     fn decode(self, encoding: ImageEncoding, report: Reporter) -> Result<(DynamicImage, Facts), String> {
         let Opened { mut decoder, facts, .. } = self.opened(encoding, report)?;
         let (width, height) = decoder.dimensions();
-        let orientation = decoder.orientation().map_err(|error| reason(&error))?;
+        let orientation = orientation(&mut *decoder).map_err(|error| reason(&error))?;
         let image = DynamicImage::from_decoder(decoder);
         let mut image =
             image.map_err(|error| format!("it claims {width} × {height} pixels: {}", reason(&error)))?;
@@ -402,28 +405,38 @@ impl Source {
     }
 
     /// A decoder of an image within the limits.
-    fn opened(self, encoding: ImageEncoding, report: Reporter) -> Result<Opened, String> {
+    fn opened(mut self, encoding: ImageEncoding, report: Reporter) -> Result<Opened, String> {
         let start = |bytes: &[u8]| ::image::guess_format(bytes).ok();
         let (mut in_memory, mut is_checked) = (0, true);
-        match &self.file {
+        match &mut self.file {
             Bytes::File(_) => is_checked = false,
             Bytes::Whole(bytes) => {
                 in_memory = self.length;
                 if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) {
                     jpeg::check_bytes(bytes.get_ref())?;
+                    jpeg::correct_transform(bytes.get_mut());
                 }
             }
             Bytes::Within(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
                 jpeg::check_bytes(bytes.get_ref())?;
+                if jpeg::misleading_transform(bytes.get_ref()).is_some() {
+                    let mut copy = bytes.get_ref().to_vec();
+                    jpeg::correct_transform(&mut copy);
+                    self.file = Bytes::Whole(Cursor::new(copy));
+                }
             }
             Bytes::Within(_) => {}
         }
         let mut bytes = BufReader::new(Counting::new(self.file, self.length, report));
-        let is_hdr = bytes.fill_buf().map_err(|error| describe_error(&error))?.starts_with(hdr::MAGIC);
+        let first = bytes.fill_buf().map_err(|error| describe_error(&error))?;
+        let (is_hdr, is_pfm) = (first.starts_with(hdr::MAGIC), pfm::is_pfm(first));
         let mut reader =
             ImageReader::new(bytes).with_guessed_format().map_err(|error| describe_error(&error))?;
         if is_hdr {
             reader.set_format(ImageFormat::Hdr);
+        }
+        if is_pfm {
+            reader.set_format(ImageFormat::Pnm);
         }
         if reader.format().is_none() {
             // Only TGA has no first bytes to recognize it by.
@@ -435,8 +448,13 @@ impl Source {
             jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?;
         }
         let growth = most_growth(reader.format());
-        let (decoder, facts) =
-            choose(reader, encoding, self.limits.memory_bytes).map_err(|error| reason(&error))?;
+        let chosen = match is_pfm {
+            true => {
+                PfmDecoder::new(reader.into_inner()).map(|decoder| (Box::new(decoder) as _, Facts::default()))
+            }
+            false => choose(reader, encoding, self.limits.memory_bytes),
+        };
+        let (decoder, facts) = chosen.map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = texel_bytes(decoder.color_type(), encoding, &facts);
         let texel_bytes =
@@ -479,23 +497,28 @@ fn choose<R: BufRead + Seek + 'static>(
             let facts = decoder.facts();
             Ok((Box::new(decoder), facts))
         }
+        Some(ImageFormat::Tga) => {
+            let (decoder, alpha) = tga::open(reader.into_inner())?;
+            Ok((Box::new(decoder), Facts { alpha, ..Facts::default() }))
+        }
         format => {
-            let alpha = match format {
-                Some(ImageFormat::Tga) => {
-                    let mut file = reader.into_inner();
-                    let alpha = tga::alpha(&mut file).map_err(ImageError::IoError)?;
-                    reader = ImageReader::with_format(file, ImageFormat::Tga);
-                    alpha
-                }
-                Some(ImageFormat::Bmp) => Alpha::Unsure,
-                _ => Alpha::Straight,
-            };
+            let mut facts = Facts::default();
+            if format == Some(ImageFormat::Bmp) {
+                facts.alpha = Alpha::Unsure;
+            }
+            if format == Some(ImageFormat::WebP) {
+                let mut file = reader.into_inner();
+                // The decoder reports what is wrong with the file.
+                let frames = image_webp::WebPDecoder::new(&mut file).map_or(0, |webp| webp.num_frames());
+                file.seek(SeekFrom::Start(0))?;
+                facts.warn_of_frames(frames);
+                reader = ImageReader::with_format(file, ImageFormat::WebP);
+            }
             // Width and height are checked elsewhere, with better messages.
             let mut limits = Limits::default();
             limits.max_alloc = Some(memory_bytes);
             reader.limits(limits);
             let mut decoder = reader.into_decoder()?;
-            let mut facts = Facts { alpha, ..Facts::default() };
             if encoding.is_declared()
                 && let Some(profile) = decoder.icc_profile()?
             {
@@ -504,6 +527,14 @@ fn choose<R: BufRead + Seek + 'static>(
             Ok((Box::new(decoder), facts))
         }
     }
+}
+
+/// The orientation of an image. Some programs begin its Exif data as in a JPEG, which `image` does not read elsewhere.
+fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
+    let found = decoder.orientation()?;
+    let exif = if found == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
+    let bare = exif.as_ref().and_then(|exif| exif.strip_prefix(b"Exif\0\0"));
+    Ok(bare.and_then(Orientation::from_exif_chunk).unwrap_or(found))
 }
 
 /// Bytes of a texel, as [`convert::texels`] makes it.
@@ -576,7 +607,7 @@ fn check_size(
 }
 
 fn unknown_format() -> String {
-    "its content is no image that can be read: png, jpg, ppm, tga, bmp, hdr, exr or webp".to_owned()
+    "its content is no image that can be read: png, jpg, ppm, pfm, tga, bmp, hdr, exr or webp".to_owned()
 }
 
 /// A decoder's error in few words, as its own text may quote much of the file.

@@ -105,14 +105,12 @@ impl<R: BufRead + Seek> PngDecoder<R> {
     /// with `cHRM` counts.
     pub(super) fn facts(&self) -> Facts {
         let (info, mut facts) = (self.reader.info(), Facts::default());
-        if let Some(frames) = info.animation_control().map(|control| control.num_frames).filter(|n| *n > 1) {
-            facts.warn(format!("it has {frames} frames; only the first is used"));
-        }
+        facts.warn_of_frames(info.animation_control().map_or(0, |control| control.num_frames));
         let is_gray = !self.color_type.has_color();
         if let Some(points) = info.coding_independent_code_points {
             match space_of_points(points) {
                 Some(space) => facts.space = space,
-                None => facts.warn("its cICP chunk has a code that is not read; its colors count as sRGB"),
+                None => facts.warn(unread_points(points)),
             }
         } else if info.srgb.is_some() {
         } else if let Some(profile) = &self.profile {
@@ -179,25 +177,50 @@ fn curve(gamma: u32) -> Curve {
     }
 }
 
-/// The space of code points of video signals (ITU-T H.273, tables 2 and 3). `None` for rare ones and for PQ and HLG.
+/// The space of code points of video signals (ITU-T H.273, tables 2 and 3). `None` for codes without a meaning, for logarithmic
+/// curves and for samples that are not full-range RGB.
 fn space_of_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
     let primaries = match points.color_primaries {
         1 => Primaries::REC_709,
+        4 => Primaries::from_numbers([0.67, 0.33, 0.21, 0.71, 0.14, 0.08, 0.310, 0.316]),
+        5 => Primaries::from_numbers([0.64, 0.33, 0.29, 0.60, 0.15, 0.06, 0.3127, 0.3290]),
+        6 | 7 => Primaries::from_numbers([0.630, 0.340, 0.310, 0.595, 0.155, 0.070, 0.3127, 0.3290]),
+        8 => Primaries::from_numbers([0.681, 0.319, 0.243, 0.692, 0.145, 0.049, 0.310, 0.316]),
         9 => Primaries::REC_2020,
+        10 => Primaries::XYZ,
+        11 => Primaries { white: [0.314, 0.351], ..Primaries::DISPLAY_P3 },
         12 => Primaries::DISPLAY_P3,
+        22 => Primaries::from_numbers([0.630, 0.340, 0.295, 0.605, 0.155, 0.077, 0.3127, 0.3290]),
         _ => return None,
     };
     let curve = match points.transfer_function {
-        1 | 6 | 14 | 15 => Curve::REC_709,
+        1 | 6 | 11 | 12 | 14 | 15 => Curve::REC_709,
         4 => Curve::Power(2.2),
         5 => Curve::Power(2.8),
+        7 => Curve::SMPTE_240M,
         8 => Curve::LINEAR,
         13 => Curve::Srgb,
+        16 => Curve::Pq,
+        18 => Curve::Hlg,
         _ => return None,
     };
     let is_plain = points.matrix_coefficients == 0 && points.is_video_full_range_image;
     let curves = [curve.clone(), curve.clone(), curve];
     is_plain.then(|| Some(ColorSpace::new(Some(curves), primaries.to_rec_709()?)))?
+}
+
+/// The warning about code points that are ignored.
+fn unread_points(points: png::CodingIndependentCodePoints) -> String {
+    let png::CodingIndependentCodePoints {
+        color_primaries,
+        transfer_function,
+        matrix_coefficients,
+        is_video_full_range_image,
+    } = points;
+    format!(
+        "its cICP chunk is ignored: primaries {color_primaries}, transfer function {transfer_function}, matrix \
+         {matrix_coefficients}, full range {is_video_full_range_image}; its colors count as sRGB"
+    )
 }
 
 /// The color profile of a file, which is then at its start again.

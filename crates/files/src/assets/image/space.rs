@@ -1,5 +1,7 @@
 //! The meaning of a file's red, green and blue: curves from samples to linear light, and primaries.
 
+use std::f64::consts::E;
+
 use super::primaries::is_identity;
 use crate::math::color::srgb_to_linear;
 use crate::math::elementary::pow_f64;
@@ -23,6 +25,10 @@ pub(super) enum Curve {
     },
     /// Values at equal distances, from 0 to 65535.
     Table(Vec<u16>),
+    /// Perceptual quantization (SMPTE ST 2084), with 1 for 203 cd/m².
+    Pq,
+    /// Hybrid log-gamma (ITU-R BT.2100, table 5), with 1 for a signal of 0.75: the light of the scene.
+    Hlg,
 }
 
 impl Curve {
@@ -34,6 +40,17 @@ impl Curve {
         b: 0.099 / 1.099,
         c: 1.0 / 4.5,
         d: 0.081,
+        e: 0.0,
+        f: 0.0,
+    };
+
+    /// The camera curve of SMPTE ST 240, inverted.
+    pub(super) const SMPTE_240M: Self = Self::Parametric {
+        g: 1.0 / 0.45,
+        a: 1.0 / 1.1115,
+        b: 0.1115 / 1.1115,
+        c: 1.0 / 4.0,
+        d: 4.0 * 0.0228,
         e: 0.0,
         f: 0.0,
     };
@@ -51,6 +68,8 @@ impl Curve {
                 }
             }
             Self::Table(values) => interpolated(values, x),
+            Self::Pq => pq(x),
+            Self::Hlg => hlg(x) / hlg(0.75),
         }
     }
 
@@ -72,6 +91,27 @@ fn power(x: f64, exponent: f64) -> f64 {
         _ if exponent == 1.0 => x,
         _ => pow_f64(x, exponent),
     }
+}
+
+/// Light of a PQ signal, in units of the reference white (ITU-R BT.2408, 2.2).
+fn pq(x: f64) -> f64 {
+    const MOST: f64 = 10_000.0 / 203.0;
+    const M1: f64 = 2610.0 / 16384.0;
+    const M2: f64 = 2523.0 / 32.0;
+    const C1: f64 = 3424.0 / 4096.0;
+    const C2: f64 = 2413.0 / 128.0;
+    const C3: f64 = 2392.0 / 128.0;
+    let root = power(x, 1.0 / M2);
+    MOST * power((root - C1) / (C2 - C3 * root), 1.0 / M1)
+}
+
+/// Light of an HLG signal, up to 1.
+fn hlg(x: f64) -> f64 {
+    const A: f64 = 0.178_832_77;
+    const B: f64 = 1.0 - 4.0 * A;
+    // 0.5 − A·ln(4·A)
+    const C: f64 = 0.559_910_729_529_562;
+    if x <= 0.5 { x * x / 3.0 } else { (pow_f64(E, (x - C) / A) + B) / 12.0 }
 }
 
 fn interpolated(values: &[u16], x: f64) -> f64 {
@@ -147,6 +187,20 @@ mod tests {
         let table = Curve::Table(vec![0, 65535, 0]);
         assert_eq!([0.0, 0.25, 0.5, 1.0].map(|x| table.decode(x)), [0.0, 0.5, 1.0, 0.0]);
         assert!((Curve::REC_709.decode(0.5) - ((0.5_f64 + 0.099) / 1.099).powf(1.0 / 0.45)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn broadcast_curves_of_known_value() {
+        let is_near = |found: f64, exact: f64| (found - exact).abs() <= 1e-4 * exact;
+        // ITU-R BT.2408, table 1: signals of the reference white, of 1000 cd/m², of 18 % gray.
+        for (signal, nits) in [(1.0, 10_000.0), (0.580_69, 203.0), (0.751_83, 1000.0), (0.0, 0.0)] {
+            assert!(is_near(Curve::Pq.decode(signal), nits / 203.0), "{signal}");
+        }
+        for (signal, light) in [(1.0, 1.0), (0.5, 1.0 / 12.0), (0.75, 0.264_963), (0.0, 0.0)] {
+            assert!(is_near(Curve::Hlg.decode(signal), light / 0.264_963), "{signal}");
+        }
+        // Both parts of HLG meet.
+        assert!(is_near(hlg(0.5), hlg(0.5 + 1e-9)));
     }
 
     #[test]

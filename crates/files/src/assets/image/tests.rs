@@ -15,6 +15,7 @@ mod exr;
 mod hdr;
 mod png;
 mod tga;
+mod webp;
 
 fn load_with(path: &Path, encoding: ImageEncoding) -> Result<Texels, AssetError> {
     Ok(load(path, encoding, ImageLimits::default(), &ignore_progress, &CancelToken::new())?.texels)
@@ -89,6 +90,41 @@ fn ppm_of_all_kinds() {
 }
 
 #[test]
+fn pfm_of_both_kinds_and_byte_orders() {
+    let color = [[0.5, 2.0, 0.0], [1.0, 0.25, 8.0]];
+    for (head, order) in [("PF\n1 2\n-1.0\n", true), ("PF 1\n2 1\n", false), ("PF\r\n1 2 2e0 ", false)] {
+        let scale = if head.contains('e') { 2.0 } else { 1.0 };
+        // Rows begin at the bottom.
+        let values = color.iter().rev().flatten().map(|value: &f32| value / scale);
+        let bytes = values.flat_map(|value| if order { value.to_le_bytes() } else { value.to_be_bytes() });
+        let file: Vec<u8> = head.bytes().chain(bytes).collect();
+        let expected = TexelData::Float(color.map(Vec3::from_array).to_vec());
+        assert_eq!(
+            load_bytes("a.pfm", &file, ImageEncoding::Color).expect("a PFM").data,
+            expected,
+            "{head:?}"
+        );
+        for length in 0..file.len() {
+            assert!(load_bytes("a.pfm", &file[..length], ImageEncoding::Color).is_err(), "{head:?} {length}");
+        }
+    }
+    let gray = [b"Pf 2 1 -1\n".as_slice(), &3.0_f32.to_le_bytes(), &(-1.0_f32).to_le_bytes()].concat();
+    let expected = TexelData::Float(vec![Vec3::splat(3.0), Vec3::ZERO]);
+    assert_eq!(load_bytes("any", &gray, ImageEncoding::Color).expect("a PFM").data, expected);
+    for wrong in [
+        "PF 0 1 1 ",
+        "PF 1 -1 1 ",
+        "PF 1 1 0 ",
+        "PF 1 1 nan ",
+        "PF 1 x 1 ",
+        "PF 70000 1 1 ",
+        "PF 60000 60000 1 ",
+    ] {
+        assert!(load_bytes("a.pfm", wrong.as_bytes(), ImageEncoding::Color).is_err(), "{wrong}");
+    }
+}
+
+#[test]
 fn sixteen_bits_keep_their_precision() {
     let file = b"P6 1 1 65535\n\x80\x01\x00\x00\xff\xff";
     let value = 32769.0 / 65535.0;
@@ -137,16 +173,21 @@ fn grey_and_alpha_become_rgb() {
     assert_eq!(data, TexelData::Srgb8(vec![[1, 2, 3]]));
 }
 
+/// CRC-32 (ISO 3309) of the type and the data of a PNG chunk.
+fn checksum(bytes: &[u8]) -> [u8; 4] {
+    let crc = bytes.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
+    });
+    (!crc).to_be_bytes()
+}
+
 /// A PNG whose header claims another size; its checksum is right.
 fn lying_png(width: u32, height: u32) -> Vec<u8> {
     let mut file = small_png();
     file[16..20].copy_from_slice(&width.to_be_bytes());
     file[20..24].copy_from_slice(&height.to_be_bytes());
-    // CRC-32 (ISO 3309) over the chunk's type and data.
-    let crc = file[12..29].iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ (0xedb8_8320 & (crc & 1).wrapping_neg()))
-    });
-    file[29..33].copy_from_slice(&(!crc).to_be_bytes());
+    let checksum = checksum(&file[12..29]);
+    file[29..33].copy_from_slice(&checksum);
     file
 }
 

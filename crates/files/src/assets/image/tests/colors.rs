@@ -2,12 +2,10 @@
 
 use std::borrow::Cow;
 
-use ::png::{
-    BitDepth, CodingIndependentCodePoints, ColorType, Encoder, Info, ScaledFloat, SourceChromaticities,
-    SrgbRenderingIntent,
-};
+use ::png::{BitDepth, ColorType, Encoder, Info, ScaledFloat, SourceChromaticities, SrgbRenderingIntent};
 
 use super::*;
+use crate::assets::image::space::Curve;
 
 /// A PNG of one pixel.
 fn png(change: impl FnOnce(&mut Info<'static>)) -> Vec<u8> {
@@ -199,24 +197,38 @@ fn profiles_that_are_not_read_are_warnings() {
 
 #[test]
 fn code_points_come_first() {
-    let points = |color_primaries, transfer_function| {
-        png(|info| {
-            gamma(0.5)(info);
-            info.coding_independent_code_points = Some(CodingIndependentCodePoints {
-                color_primaries,
-                transfer_function,
-                matrix_coefficients: 0,
-                is_video_full_range_image: true,
-            });
-        })
+    // The encoder does not write the chunk.
+    let points = |codes: [u8; 4]| {
+        let mut file = png(gamma(0.5));
+        let chunk = [b"cICP".as_slice(), &codes].concat();
+        let whole = [[0, 0, 0, 4].as_slice(), &chunk, &checksum(&chunk)].concat();
+        file.splice(HEADER_END..HEADER_END, whole);
+        file
     };
-    // The encoder does not write the chunk; this one has its own checksum.
-    if points(12, 13).windows(4).any(|name| name == b"cICP") {
-        assert!(is_near(color(&points(12, 13)), P3));
-        assert!(is_near(color(&points(1, 8)), power(1.0)));
-        assert_eq!(warned("a.png", &points(9, 16), ImageEncoding::Color).len(), 1);
+    let of = |primaries, transfer| color(&points([primaries, transfer, 0, 1]));
+    assert!(is_near(of(12, 13), P3));
+    assert!(is_near(of(1, 8), power(1.0)));
+    let of_curve =
+        |curve: Curve| Vec3::from_array([188.0, 128.0, 64.0].map(|x| curve.decode(x / 255.0) as f32));
+    for (transfer, curve) in [(16, Curve::Pq), (18, Curve::Hlg), (7, Curve::SMPTE_240M), (11, Curve::REC_709)]
+    {
+        assert!(is_near(of(1, transfer), of_curve(curve)), "{transfer}");
+    }
+    for primaries in [1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 22] {
+        let file = points([primaries, 13, 0, 1]);
+        assert!(warned("a.png", &file, ImageEncoding::Color).is_empty(), "{primaries}");
+    }
+    // Codes without a meaning, logarithms, and the range of video.
+    for codes in [[3, 13, 0, 1], [2, 2, 0, 1], [1, 9, 0, 1], [9, 16, 0, 0]] {
+        let warnings = warned("a.png", &points(codes), ImageEncoding::Color);
+        assert_eq!(warnings.len(), 1, "{codes:?}");
+        assert!(codes[..2].iter().all(|code| warnings[0].contains(&format!(" {code}"))), "{warnings:?}");
+        assert!(is_near(color(&points(codes)), color(&png(|_| {}))), "{codes:?}");
     }
 }
+
+/// The end of a PNG's first chunk.
+const HEADER_END: usize = 33;
 
 #[test]
 fn the_encoding_of_the_scene_comes_before_the_file() {

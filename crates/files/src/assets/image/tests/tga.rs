@@ -52,6 +52,52 @@ fn the_header_or_the_extension_says_what_the_fourth_byte_is() {
     assert!((opacity(&broken) - 0.2).abs() < 1e-6);
 }
 
+/// A TGA of these pixels in one row: kind, bits of a pixel, alpha bits of the header.
+fn row([kind, bits, alpha_bits]: [u8; 3], pixels: &[u8]) -> Vec<u8> {
+    let width = pixels.len() as u8 / bits.div_ceil(8).max(1);
+    [&[0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, width, 0, 1, 0, bits, 0x20 | alpha_bits], pixels].concat()
+}
+
+#[test]
+fn gray_of_16_bits_is_gray_and_alpha() {
+    let pixels = [51, 255, 255, 102];
+    let packed = [0x01, 51, 255, 255, 102];
+    for alpha_bits in [0, 1, 8, 15] {
+        for file in [row([3, 16, alpha_bits], &pixels), {
+            let mut file = row([11, 16, alpha_bits], &packed);
+            file[12] = 2;
+            file
+        }] {
+            let texels = load_bytes("a.tga", &file, ImageEncoding::Linear).expect("a TGA");
+            assert_eq!(texels.data, TexelData::Linear8(vec![[51; 3], [255; 3]]));
+            // Without alpha bits in the header, the luminance is the opacity.
+            let expected = if alpha_bits == 0 { 0.2 } else { 1.0 };
+            assert!((opacity(&file) - expected).abs() < 1e-6, "{alpha_bits}");
+        }
+    }
+}
+
+#[test]
+fn alpha_bits_that_do_not_fit_are_ignored() {
+    for (kind, bits, pixels, expected) in [
+        (2, 24, vec![10, 20, 30], [30, 20, 10]),
+        (2, 32, vec![10, 20, 30, 40], [30, 20, 10]),
+        (2, 16, vec![0x1f, 0x80], [0, 0, 255]),
+        (3, 8, vec![7], [7; 3]),
+    ] {
+        for alpha_bits in [0, 1, 3, 8, 15] {
+            let file = row([kind, bits, alpha_bits], &pixels);
+            let texels = load_bytes("a.tga", &file, ImageEncoding::Linear).expect("a TGA");
+            assert_eq!(texels.data, TexelData::Linear8(vec![expected]), "{kind} {bits} {alpha_bits}");
+        }
+    }
+    for (kind, bits) in [(3, 24), (11, 32), (2, 8), (0, 8), (32, 8), (4, 24)] {
+        let said = says("a.tga", &row([kind, bits, 0], &[0; 12]));
+        let number = if kind == 3 || kind == 11 || kind == 2 { bits } else { kind };
+        assert!(said.contains(&number.to_string()) && said.contains("PNG"), "{said}");
+    }
+}
+
 #[test]
 fn a_bitmap_whose_alpha_is_unused_is_opaque() {
     let folder = tempfile::tempdir().expect("a folder");
