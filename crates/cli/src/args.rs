@@ -436,7 +436,7 @@ pub struct RenderArgs {
     /// Most samples per pixel
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Image")]
     pub samples: Option<u32>,
-    /// Relative noise at which a tile is finished; 0 disables it
+    /// Noise at which a tile is finished; 0 disables it
     #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = number_of("error", ERROR), help_heading = "Image")]
     pub error: Option<f32>,
     /// Stop after this time
@@ -450,7 +450,7 @@ pub struct RenderArgs {
     /// Render a view (AOV), such as normal or albedo
     #[arg(long, value_parser = one_of::<View>(), hide_possible_values = true, long_help = listed::<View>("Render a view: the beauty image or an AOV"), value_name = "NAME", help_heading = "Image")]
     pub view: Option<View>,
-    /// View a model from front, back, left, right, top, bottom or iso
+    /// Side of a model: front, back, left, right, top, bottom, iso
     #[arg(long, value_parser = one_of::<Side>(), hide_possible_values = true, long_help = listed::<Side>("View a model from this side instead of its own camera"), value_name = "SIDE", help_heading = "Image")]
     pub from: Option<Side>,
     /// Up axis of a model: x, y, z
@@ -480,7 +480,7 @@ pub struct RenderArgs {
     /// Applies after the first diffuse or glossy reflection of a path. 0 disables the limit.
     #[arg(long, value_name = "L", allow_negative_numbers = true, value_parser = number_of("clamp", CLAMP), help_heading = "Rendering")]
     pub clamp: Option<f32>,
-    /// Photon mapping in whitted: indirect light and caustics
+    /// Photon mapping in whitted: indirect light, caustics
     #[arg(long, value_parser = one_of::<Switch>(), hide_possible_values = true, value_name = "on|off", help_heading = "Rendering")]
     pub photons: Option<Switch>,
     /// Depth of field, if the camera has an aperture
@@ -505,7 +505,7 @@ pub struct RenderArgs {
     /// Colors: auto, truecolor, 256, 16, none
     #[arg(long, value_parser = one_of::<ColorChoice>(), hide_possible_values = true, long_help = listed::<ColorChoice>("Colors of messages and images"), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
-    /// Notify after longer renders; 0 disables it
+    /// Notify after renders longer than this; 0 disables it
     ///
     /// Shows a desktop notification through the terminal when a longer render ends while the window is not focused.
     #[arg(long, allow_negative_numbers = true, value_parser = notification_time, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]

@@ -1,5 +1,5 @@
-//! Texts on stderr and stdout outside of the terminal UI. Text on stderr cannot fail: whoever closed the pipe does not read.
-//! Answers on stdout can, if the disk is full. Every text is made harmless before it is shown.
+//! Output to stderr and stdout outside of the terminal UI. Errors of stderr are ignored. Errors of stdout, such as a full disk,
+//! determine the exit code. All text is sanitized.
 
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
@@ -12,17 +12,17 @@ use crate::scene::sanitize::visible;
 use crate::system::describe_error;
 use crate::tui::ColorChoice;
 
-/// The two streams.
+/// Writes to stderr and stdout.
 #[derive(Clone, Debug)]
 pub(super) struct Console {
     style: Style,
     pub(super) is_terminal: bool,
-    /// Why an answer did not get through.
-    lost: Rc<RefCell<Option<io::Error>>>,
+    /// The first error of stdout that is not a closed pipe.
+    stdout_error: Rc<RefCell<Option<io::Error>>>,
 }
 
-/// Columns where stderr is no terminal.
-const PLAIN_COLUMNS: usize = 120;
+/// Width of messages if stderr is not a terminal.
+const DEFAULT_COLUMNS: usize = 120;
 
 impl Console {
     pub(super) fn new(color: ColorChoice) -> Self {
@@ -35,10 +35,10 @@ impl Console {
             ColorChoice::TrueColor | ColorChoice::Indexed256 | ColorChoice::Ansi16 => true,
         };
         let style = if colored { Style::Ansi } else { Style::Plain };
-        Self { style, is_terminal: is_terminal && !is_dumb, lost: Rc::default() }
+        Self { style, is_terminal: is_terminal && !is_dumb, stdout_error: Rc::default() }
     }
 
-    /// Whether messages have colors.
+    /// Whether messages are colored.
     pub(super) fn is_colored(&self) -> bool {
         match self.style {
             Style::Ansi => true,
@@ -46,60 +46,61 @@ impl Console {
         }
     }
 
-    /// A line on stderr; a line end within the text becomes visible.
+    /// Prints a line to stderr. Line ends within the text become visible.
     pub(super) fn say(&self, text: &str) {
         let line = format!("{}\n", visible(text));
         let _ = std::io::stderr().lock().write_all(line.as_bytes());
     }
 
-    /// Lines on stderr, one after the other.
+    /// Prints lines to stderr.
     pub(super) fn say_lines(&self, text: &str) {
         text.trim_end().lines().for_each(|line| self.say(line));
     }
 
-    /// A line on stdout.
+    /// Prints a line to stdout.
     pub(super) fn answer(&self, text: &str) {
         self.text(&format!("{}\n", visible(text)));
     }
 
-    /// Columns of stdout, if it is a terminal.
+    /// Width of stdout in columns, if it is a terminal.
     pub(super) fn answer_columns(&self) -> Option<usize> {
         terminal_columns(io::stdout().is_terminal())
     }
 
-    /// A text of our own on stdout, as it is.
+    /// Prints trusted text to stdout unchanged.
     pub(super) fn text(&self, text: &str) {
         let mut stdout = std::io::stdout().lock();
         self.note(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()));
     }
 
-    /// Note whether something went to stdout.
+    /// Records an error of writing to stdout.
     pub(super) fn note(&self, written: io::Result<()>) {
         match written {
-            // Who closed the pipe has read enough.
-            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => *self.lost.borrow_mut() = Some(error),
+            // A closed pipe is not an error: the reader has seen enough.
+            Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+                *self.stdout_error.borrow_mut() = Some(error)
+            }
             Ok(()) | Err(_) => {}
         }
     }
 
-    /// Exit code of the program: a failure if an answer did not get through.
+    /// The exit code of the program: a failure if stdout could not be written.
     pub(super) fn end(&self, exit: Exit) -> Exit {
-        match self.lost.take() {
-            Some(error) if exit == Exit::DONE => self.fail(
-                Exit::FAILED,
-                &format!("the answer cannot be written to stdout: {}", describe_error(&error)),
-            ),
+        match self.stdout_error.take() {
+            Some(error) if exit == Exit::DONE => {
+                self.fail(Exit::FAILED, &format!("cannot write to stdout: {}", describe_error(&error)))
+            }
             Some(_) | None => exit,
         }
     }
 
-    /// `error: …` on stderr.
+    /// Prints `error: …` to stderr and returns `exit`.
     pub(super) fn fail(&self, exit: Exit, message: &str) -> Exit {
         self.say(&format!("error: {message}"));
         exit
     }
 
-    /// Errors and warnings, with their places.
+    /// Prints errors and warnings with their source lines to stderr.
     pub(super) fn diagnostics(&self, diagnostics: &[Diagnostic]) {
         if !diagnostics.is_empty() {
             let text = render(diagnostics, columns(), self.style);
@@ -109,10 +110,10 @@ impl Console {
 }
 
 fn columns() -> usize {
-    terminal_columns(io::stderr().is_terminal()).unwrap_or(PLAIN_COLUMNS)
+    terminal_columns(io::stderr().is_terminal()).unwrap_or(DEFAULT_COLUMNS)
 }
 
-/// Width of running text on stdout in columns: the terminal's, or 80 without a terminal.
+/// Width of text on stdout in columns: the terminal's, or 80.
 pub(super) fn answer_columns() -> usize {
     terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
 }

@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::Locator;
 
-/// A diagnostic. Lines and columns count from 1, columns in characters; the end is exclusive. A value that it does not have is null.
+/// Converts a diagnostic. Lines and columns start at 1, columns count characters, and the end is exclusive. Missing values are
+/// null.
 pub(super) fn diagnostic(one: &Diagnostic, places: &mut Locator) -> Value {
     let severity = match one.severity {
         Severity::Error => "error",
@@ -35,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_has_an_end_and_a_label() {
+    fn spans_have_an_end_and_a_label() {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
         let outcome = crate::scene::parse(text.into(), Path::new("a.toml"));
         let error = outcome.diagnostics.iter().find(|one| one.severity == Severity::Error).expect("an error");

@@ -2,19 +2,19 @@
 
 use std::process::ExitCode;
 
-/// Exit code of the program.
+/// An exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Exit(pub u8);
 
 impl Exit {
-    /// The work is done.
+    /// Success.
     pub const DONE: Self = Self(0);
     /// The work failed.
     pub const FAILED: Self = Self(1);
-    /// The call or the scene is wrong.
+    /// The arguments or the scene are invalid.
     pub const WRONG: Self = Self(2);
 
-    /// Ended by a signal of this number.
+    /// Terminated by a signal.
     pub fn signal(number: i32) -> Self {
         Self(u8::try_from(128 + number).unwrap_or(1))
     }

@@ -1,6 +1,6 @@
 //! The command line: arguments, the headless front end, and the wiring of the terminal's.
 //!
-//! Arguments ([`args`]) are turned into their meaning (`lower`) before anything is done.
+//! Arguments ([`args`]) are validated and lowered (`lower`) before any work starts.
 
 pub mod args;
 pub mod bench;
@@ -36,21 +36,21 @@ pub use self::exit::Exit;
 use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 
-/// Do what the command line says; gives the exit code.
+/// Runs a command line and returns its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     crate::output::write::prepare_process();
-    // Without the handler an abort ends the process as it always did.
+    // If the handler cannot be installed, an abort ends the process as usual.
     let _ = crate::system::abort::catch();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     if let Some(exit) = commands::completions::answer(&arguments) {
         return exit;
     }
     if arguments.len() <= 1 {
-        return bare();
+        return run_without_arguments();
     }
     let args = match Args::try_parse_from(&arguments) {
         Ok(args) => args,
-        Err(error) => return misunderstood(&error, &arguments),
+        Err(error) => return report_parse_error(&error, &arguments),
     };
     let console = Console::new(args.color());
     let exit = match args.command {
@@ -71,7 +71,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Lsp { .. }) => commands::lsp::run(&console),
         Some(Subcommand::Doctor) => commands::doctor::run(&console),
         None => match lower::lower(args.render) {
-            Ok(order) => match no_command(&order.scene) {
+            Ok(order) => match mistyped_command(&order.scene) {
                 Some(message) => console.fail(Exit::WRONG, &message),
                 None => render(order, &console),
             },
@@ -82,7 +82,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
 }
 
 fn render(order: lower::Order, console: &Console) -> Exit {
-    // JSON lines have their own form of the same error.
+    // With JSON progress, the error is reported as JSON.
     let refused = (!order.is_in_json()).then(|| commands::info::instead_of_scene(&order.scene, console));
     match refused.flatten() {
         Some(exit) => exit,
@@ -91,24 +91,24 @@ fn render(order: lower::Order, console: &Console) -> Exit {
     }
 }
 
-/// The way to begin, for a call without a word.
-const BEGIN: &str = "\
-glimt renders a scene file here in the terminal, again on every save.
+/// Text for a call without arguments.
+const GETTING_STARTED: &str = "\
+glimt renders a scene file in the terminal and updates it on every save.
 
   glimt new ball.toml     write a scene to start from
-  glimt ball.toml         see it; edit it in an editor, save, and see it again
-  glimt helmet.glb        see a model
+  glimt ball.toml         render it; edit and save it to update the image
+  glimt helmet.glb        view a model
 
-`glimt -h` lists commands and options.";
+Run `glimt -h` for all commands and options.";
 
-/// A call without a word: no scene is given, which is wrong, and the way to one is shown.
-fn bare() -> Exit {
-    Console::new(crate::tui::ColorChoice::Auto).say_lines(BEGIN);
+/// Handles a call without arguments.
+fn run_without_arguments() -> Exit {
+    Console::new(crate::tui::ColorChoice::Auto).say_lines(GETTING_STARTED);
     Exit::WRONG
 }
 
-/// Help and the version are answers; everything else is a wrong call.
-fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
+/// Prints the help, the version or an error.
+fn report_parse_error(error: &clap::Error, arguments: &[OsString]) -> Exit {
     let console = Console::new(crate::tui::ColorChoice::Auto);
     if !error.use_stderr() {
         console.note(error.print().and_then(|()| io::stdout().flush()));
@@ -118,10 +118,10 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
         return console.fail(Exit::WRONG, &message);
     }
     if let Some(second) = second_scene(error) {
-        let message = format!("{second:?} is one scene too many: glimt renders one at a time");
+        let message = format!("glimt takes one scene; got a second: {second:?}");
         return console.fail(Exit::WRONG, &message);
     }
-    // The message has the arguments in it: made again of what may be shown of them.
+    // clap's message contains the arguments, so parse sanitized ones again to get a message that is safe to print.
     let shown = arguments.iter().map(|argument| visible(&argument.to_string_lossy()).into_owned());
     match Args::try_parse_from(shown) {
         Err(error) if error.use_stderr() => {
@@ -132,14 +132,14 @@ fn misunderstood(error: &clap::Error, arguments: &[OsString]) -> Exit {
     Exit::WRONG
 }
 
-/// Message about a first word that is neither a file nor looks like one: a command was meant.
+/// Message about a first argument that looks like a mistyped command.
 fn unknown_command(arguments: &[OsString]) -> Option<String> {
-    // A later word may be the value of an option.
-    no_command(Path::new(arguments.get(1)?))
+    // A later argument may be the value of an option.
+    mistyped_command(Path::new(arguments.get(1)?))
 }
 
-/// The same of a word where a scene stands.
-fn no_command(word: &Path) -> Option<String> {
+/// Message about a scene argument that looks like a mistyped command.
+fn mistyped_command(word: &Path) -> Option<String> {
     let first = word.to_string_lossy();
     if first.contains(['.', '/']) || first.starts_with('-') || word.symlink_metadata().is_ok() {
         return None;
@@ -148,12 +148,12 @@ fn no_command(word: &Path) -> Option<String> {
     let names: Vec<&str> = commands.get_subcommands().map(clap::Command::get_name).collect();
     let help = match nearest(&first, names.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),
-        None => format!("there are {}", names.join(", ")),
+        None => format!("expected one of {}", names.join(", ")),
     };
-    Some(format!("there is no command {:?}, nor a scene of that name: {help}", visible(&first)))
+    Some(format!("no such command or scene: {:?}; {help}", visible(&first)))
 }
 
-/// The word behind the scene, where a command could stand, that is no command.
+/// The extra argument after a scene that is neither an option nor a command.
 fn second_scene(error: &clap::Error) -> Option<&str> {
     use clap::error::{ContextKind, ContextValue, ErrorKind};
     let word = match error.get(ContextKind::InvalidSubcommand).or(error.get(ContextKind::InvalidArg)) {

@@ -1,4 +1,4 @@
-//! The terminal UI: worker, watcher and front end wired together.
+//! Connects the worker, the file watcher and the terminal UI.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
@@ -18,12 +18,18 @@ use crate::scene::{SAME_TEXT, is_absence, text_now};
 use crate::system::threads::start_failure;
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
-/// Time that the end waits for a picture that is being written, after a signal; and after a key, until a person hears what it
-/// waits for.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// Time to wait at exit for an image that is being written: after a signal before giving up, after a key before telling the
+/// user.
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Line printed if glimt exits before the image is written.
+pub const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
+/// Help of the error about a missing scene in the terminal UI.
+pub const WAITING: &str = "waiting for it to appear";
+
+/// Runs the terminal UI.
 pub(super) fn run(order: Order, console: &Console) -> Exit {
-    // A text that an interrupted replacement has left may be all there is.
+    // Restore a scene whose replacement was interrupted.
     held::recover(&order.scene);
     if let Some(absent) = absent(&order.scene) {
         console.diagnostics(&[absent]);
@@ -40,16 +46,18 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {
-        // A front end that is gone wants no news.
+        // Ignore a front end that has exited.
         let _ = sender.send(said);
     })
     .map_err(no_thread)?;
     let (forward, events) = channel();
     let from_worker = std::mem::replace(&mut worker.events, channel().1);
     let writes = Writes::default();
-    let heard = writes.clone();
-    let tap = move || tap(&from_worker, &watcher, &heard, |event| forward.send(event).is_ok());
-    let tap = std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
+    let recorder = writes.clone();
+    let forward_all =
+        move || forward_events(&from_worker, &watcher, &recorder, |event| forward.send(event).is_ok());
+    let forwarder = std::thread::Builder::new().name("glimt-events".to_owned());
+    let forwarder = forwarder.spawn(forward_all).map_err(no_thread)?;
     let (remote, contents) = (worker.remote(), worker.contents());
     let asked = writes.clone();
     let outcome = tui::run(Options {
@@ -61,7 +69,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         notify_after: Duration::try_from_secs_f64(order.notify_after).ok().filter(|time| !time.is_zero()),
         commands: Box::new(move |command| {
             match command {
-                Command::Write => asked.order(),
+                Command::Write => asked.start(),
                 Command::Quit => asked.leave(),
                 Command::Render(_)
                 | Command::Preview(_)
@@ -81,15 +89,15 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let waits = |ended: &TuiOutcome| {
         ended.status == ExitStatus::QUIT && (ended.is_write_unanswered || writes.is_last_stage())
     };
-    let has_ended = if worker.end_within(PATIENCE) || !outcome.as_ref().is_ok_and(waits) {
+    let has_ended = if worker.end_within(EXIT_TIMEOUT) || !outcome.as_ref().is_ok_and(waits) {
         worker.finish(Duration::ZERO)
     } else {
-        console.say("waiting for the image that is being written; ctrl-c ends it without");
+        console.say("waiting for the image to be written; press ctrl-c to quit without it");
         worker.finish(Duration::MAX)
     };
     if has_ended {
-        // It ends with the worker; a panic of it has nothing more to say.
-        let _ = tap.join();
+        // The thread ends with the worker. Ignore a panic.
+        let _ = forwarder.join();
     }
     if let Ok(ended) = &outcome {
         let lost = contents.outputs.lost(&contents);
@@ -105,15 +113,15 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// Outcomes of writing that the user does not know of. After `q` the summary follows if there are none, and if an order to write
-/// was not carried out while earlier files exist. Then the checkpoint, and changes by keys that are lost. `lost`: outputs that
-/// other programs have changed. `call`: this call, in words for a shell.
+/// Lines printed after the terminal UI: unreported results of writing, then after `q` the summary (if there are none, or if a
+/// write failed while earlier files exist), then the checkpoint and lost changes. `lost` are outputs changed by other programs,
+/// and `call` is this command line.
 fn last_words(
     writes: &Writes,
     ended: &TuiOutcome,
     (has_ended, lost, call): (bool, &[(PathBuf, Lost)], &str),
 ) -> Vec<String> {
-    let mut lines = writes.said(ended.is_write_unanswered, has_ended);
+    let mut lines = writes.unreported(ended.is_write_unanswered, has_ended);
     let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
     let has_quit = ended.status == ExitStatus::QUIT;
     let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
@@ -136,7 +144,7 @@ fn last_words(
     lines
 }
 
-/// This call, in words for a shell.
+/// This command line, quoted for a shell.
 fn call() -> String {
     let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
         Ok(quoted) => quoted.into_owned(),
@@ -145,7 +153,7 @@ fn call() -> String {
     format!("glimt {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// Error about a scene that does not exist at the start; glimt waits for a scene that disappears later.
+/// The error about a scene that does not exist at the start. glimt waits for a scene that disappears later.
 fn absent(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
@@ -153,71 +161,72 @@ fn absent(scene: &Path) -> Option<Diagnostic> {
     text_now(scene).err().map(|problem| *problem).filter(is_absence)
 }
 
-/// Outcomes of writing pictures.
+/// Results of writing images, shared between threads.
 #[derive(Clone, Debug, Default)]
-struct Writes(Arc<Mutex<Heard>>);
+struct Writes(Arc<Mutex<WriteLog>>);
 
+/// Results of writing images.
 #[derive(Debug, Default)]
-struct Heard {
-    /// A line for each picture since the last order to write, and whether it came after the front end was left.
+struct WriteLog {
+    /// A line for each image since the last write command, and whether it came after the UI exited.
     lines: Vec<(bool, String)>,
-    /// Whether a picture was written since the last order to write.
+    /// Whether an image was written since the last write command.
     has_written: bool,
     has_left: bool,
-    /// The checkpoint that was written after the front end was left, or the reason why there is none.
+    /// The checkpoint written after the UI exited, or the reason why there is none.
     checkpoint: Option<Result<PathBuf, String>>,
-    /// Whether a request is at its last stage.
+    /// Whether a request is in its last stage.
     is_last_stage: bool,
 }
 
 impl Writes {
-    fn heard(&self) -> MutexGuard<'_, Heard> {
+    fn log(&self) -> MutexGuard<'_, WriteLog> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A person asks for the picture.
-    fn order(&self) {
-        let mut heard = self.heard();
-        heard.lines.clear();
-        heard.has_written = false;
+    /// Records a write command of the user.
+    fn start(&self) {
+        let mut log = self.log();
+        log.lines.clear();
+        log.has_written = false;
     }
 
-    /// The front end is left.
+    /// Records that the UI has exited.
     fn leave(&self) {
-        self.heard().has_left = true;
+        self.log().has_left = true;
     }
 
     fn has_written(&self) -> bool {
-        self.heard().has_written
+        self.log().has_written
     }
 
     fn is_last_stage(&self) -> bool {
-        self.heard().is_last_stage
+        self.log().is_last_stage
     }
 
-    fn hear(&self, event: &Event) {
-        let mut heard = self.heard();
-        let has_left = heard.has_left;
+    fn record(&self, event: &Event) {
+        let mut log = self.log();
+        let has_left = log.has_left;
         match event {
             Event::Written { path, .. } => {
-                heard.lines.push((has_left, format!("wrote {}", path.display())));
-                heard.has_written = true;
+                log.lines.push((has_left, format!("wrote {}", path.display())));
+                log.has_written = true;
             }
-            Event::WriteFailed { message, .. } => heard.lines.push((has_left, format!("error: {message}"))),
+            Event::WriteFailed { message, .. } => log.lines.push((has_left, format!("error: {message}"))),
             Event::Refused { conflicts, .. } => {
                 let lines =
                     conflicts.iter().map(|conflict| (has_left, format!("error: {}", conflict.message)));
-                heard.lines.extend(lines);
+                log.lines.extend(lines);
             }
             Event::Stage { stage, .. } => {
-                heard.is_last_stage = stage.name == Stage::Write && stage.status == Status::Running;
+                log.is_last_stage = stage.name == Stage::Write && stage.status == Status::Running;
             }
             Event::Done { .. } | Event::Failed { .. } | Event::Cancelled { .. } => {
-                heard.is_last_stage = false;
+                log.is_last_stage = false;
             }
             Event::Checkpoint { news, .. } if has_left => match news {
-                CheckpointNews::Written { path } => heard.checkpoint = Some(Ok(path.clone())),
-                CheckpointNews::Failed { message } => heard.checkpoint = Some(Err(message.clone())),
+                CheckpointNews::Written { path } => log.checkpoint = Some(Ok(path.clone())),
+                CheckpointNews::Failed { message } => log.checkpoint = Some(Err(message.clone())),
                 CheckpointNews::Resumed { .. }
                 | CheckpointNews::Absent { .. }
                 | CheckpointNews::Ignored { .. }
@@ -245,31 +254,35 @@ impl Writes {
         }
     }
 
-    /// The checkpoint of a render that was left, or the reason why there is none.
+    /// The checkpoint written after the UI exited, or the reason why there is none.
     fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
-        self.heard().checkpoint.clone()
+        self.log().checkpoint.clone()
     }
 
-    /// A line for each picture that a person does not know of: those after the front end was left; of an order that is
-    /// unanswered all since then.
-    fn said(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
-        let heard = self.heard();
-        let unknown = heard.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
+    /// Lines about images that the UI has not reported: those after it exited, or all since an unanswered write command.
+    fn unreported(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
+        let log = self.log();
+        let unknown = log.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
         let mut lines: Vec<String> = unknown.map(|(_, line)| line.clone()).collect();
-        if !has_ended && (is_unanswered || heard.is_last_stage) || is_unanswered && lines.is_empty() {
-            lines.push("the image was not written: glimt was ended first".to_owned());
+        if !has_ended && (is_unanswered || log.is_last_stage) || is_unanswered && lines.is_empty() {
+            lines.push(NOT_WRITTEN.to_owned());
         }
         lines
     }
 }
 
-/// Passes events on; tells the watcher which files to watch, and notes which pictures were written.
-fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: impl Fn(Event) -> bool) {
-    let mut is_heard = true;
+/// Forwards events, updates the watched files and records written images.
+fn forward_events(
+    events: &Receiver<Event>,
+    watcher: &Watcher,
+    writes: &Writes,
+    forward: impl Fn(Event) -> bool,
+) {
+    let mut is_connected = true;
     for mut event in events {
-        writes.hear(&event);
-        // The front end is gone: only what is still written counts.
-        if !is_heard {
+        writes.record(&event);
+        // The UI has exited: only record written images.
+        if !is_connected {
             continue;
         }
         if matches!(event, Event::Written { .. }) {
@@ -282,23 +295,23 @@ fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: im
         if let Event::Failed { failure: Failure::Scene(all), .. } = &mut event {
             all.iter_mut().for_each(await_scene);
         }
-        is_heard = forward(event);
+        is_connected = forward(event);
     }
 }
 
-/// A scene that is not there may come (back): what watches it needs no other way out.
+/// Replaces the help of the error about a missing scene: the UI waits for it to appear.
 fn await_scene(problem: &mut Diagnostic) {
     if is_absence(problem) {
-        // A typo, or a new name.
+        // Keep a suggestion for a typo or a renamed scene.
         let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
         let file = problem.help.take().filter(is_file);
         let file = file.map_or(String::new(), |help| format!("; {help}"));
         problem.help = Some(match missing_folder(&problem.path) {
             Some(folder) => format!(
-                "the folder {} is not there; the scene is rendered as soon as both are{file}",
+                "waiting for the folder {} and the scene to appear{file}",
                 visible(&folder.to_string_lossy())
             ),
-            None => format!("it is rendered as soon as it is there{file}"),
+            None => format!("{WAITING}{file}"),
         });
     }
 }
@@ -308,8 +321,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_order_that_was_not_carried_out_is_told_beside_the_files_that_are_there() {
-        let summary = "wrote a.png: 640×480, 4 samples, 1.39 s; the render after it was stopped at 0 %";
+    fn failed_writes_are_reported_before_the_summary() {
+        let summary = "wrote a.png: 640×480, 4 samples, 1.39 s; the next render was stopped at 0 %";
         let ended = |has_written| TuiOutcome {
             status: ExitStatus::QUIT,
             is_write_unanswered: true,
@@ -319,21 +332,21 @@ mod tests {
             not_kept: None,
         };
         let writes = Writes::default();
-        writes.hear(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
-        writes.order();
+        writes.record(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
+        writes.start();
         writes.leave();
-        let message = "the newest picture is not written".to_owned();
-        writes.hear(&Event::WriteFailed { generation: 2, path: None, message });
-        let error = "error: the newest picture is not written";
+        let message = "the latest image is not written".to_owned();
+        writes.record(&Event::WriteFailed { generation: 2, path: None, message });
+        let error = "error: the latest image is not written";
         let said = |ended: TuiOutcome| last_words(&writes, &ended, (true, &[], "glimt a.toml"));
         assert_eq!(said(ended(true)), [error, summary]);
         assert_eq!(said(ended(false)), [error]);
-        writes.hear(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
+        writes.record(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
         assert_eq!(said(ended(true)), [error, "wrote a.png"]);
     }
 
     #[test]
-    fn the_last_line_lists_changes_and_the_summary_says_what_became_of_the_files() {
+    fn summary_includes_lost_files_and_changes() {
         let ended = |status| TuiOutcome {
             status,
             is_write_unanswered: false,
@@ -353,7 +366,7 @@ mod tests {
         assert_eq!(said(ExitStatus::QUIT, &lost), [removed, not_kept]);
         writes.leave();
         let news = CheckpointNews::Written { path: "a.png.checkpoint".into() };
-        writes.hear(&Event::Checkpoint { generation: 1, news });
+        writes.record(&Event::Checkpoint { generation: 1, news });
         let continues = "a.png not finished (10 %); glimt a.toml --seed 1 continues";
         assert_eq!(said(ExitStatus::QUIT, &[]), [continues, not_kept]);
         let saved = "progress saved in a.png.checkpoint; run glimt again to resume";
@@ -362,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_is_gone_is_waited_for() {
+    fn missing_scenes_are_awaited() {
         let folder = tempfile::tempdir().expect("a folder");
         let said = |name: &str| {
             let [mut problem] = crate::scene::load(&folder.path().join(name), &[])
@@ -370,22 +383,18 @@ mod tests {
                 .try_into()
                 .expect("one problem");
             await_scene(&mut problem);
-            problem.help.expect("a way out")
+            problem.help.expect("a help text")
         };
-        assert_eq!(said("room.toml"), "it is rendered as soon as it is there");
+        assert_eq!(said("room.toml"), WAITING);
         let mut renamed = *crate::scene::text_now(Path::new("none.toml")).expect_err("there is none");
         renamed.help = Some(format!("third.toml {SAME_TEXT}"));
         await_scene(&mut renamed);
         assert!(renamed.help.is_some_and(|help| help.contains("third.toml")));
         let name = "gone/room.toml";
-        assert!(
-            said(name).ends_with("/gone is not there; the scene is rendered as soon as both are"),
-            "{}",
-            said(name)
-        );
+        assert!(said(name).contains("/gone ") && said(name).starts_with("waiting"), "{}", said(name));
         std::fs::write(folder.path().join("rooms.toml"), "").expect("written");
-        assert!(said("room.toml").contains("as soon as it is there; did you mean"));
+        assert!(said("room.toml").starts_with(&format!("{WAITING}; did you mean")));
         std::fs::write(folder.path().join("room.toml"), "").expect("written");
-        assert!(!said("room.toml").contains("as soon as"), "another problem has its own way out");
+        assert!(!said("room.toml").contains(WAITING), "other problems keep their help");
     }
 }

@@ -1,4 +1,4 @@
-//! Meaning of the arguments.
+//! Validates the arguments of a render and lowers them to an [`Order`].
 
 use std::path::{Path, PathBuf};
 
@@ -10,13 +10,13 @@ use crate::pipeline::settings::Overrides;
 use crate::pipeline::turntable;
 use crate::tui::{ColorChoice, PreviewChoice};
 
-/// Standard output, where it stands for a file.
-pub(super) const STANDARD: &str = "-";
+/// The file name for standard output.
+pub(super) const STDOUT_NAME: &str = "-";
 
-/// Nice value by which the terminal's renders give way to the front end and to all other programs.
-const POLITE: u8 = 10;
+/// Default niceness of render threads in the terminal UI, so that the UI and other programs stay responsive.
+const UI_NICENESS: u8 = 10;
 
-/// An order of the call.
+/// A validated render request.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
     pub(super) scene: PathBuf,
@@ -27,40 +27,40 @@ pub(super) struct Order {
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
     pub(super) notify_after: f64,
-    /// Increase of the nice value: with `is_once` that of the program, else that of the render threads.
+    /// Niceness: of the process with `is_once`, otherwise of the render threads.
     pub(super) nice: u8,
 }
 
 impl Order {
-    /// Whether errors go into JSON lines.
+    /// Whether errors are reported as JSON lines.
     pub(super) fn is_in_json(&self) -> bool {
         self.is_once && self.progress == Progress::Json
     }
 }
 
-/// The meaning of the arguments.
+/// Validates and lowers the arguments.
 ///
 /// # Errors
-/// What is wrong with them, in words with the way out.
+/// A message with a hint.
 pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     match args.shard {
         Some(_) if !args.once => {
-            return Err("--shard needs --once: the terminal shows whole pictures".to_owned());
+            return Err("--shard needs --once: the terminal UI renders complete images".to_owned());
         }
-        // A part may have any name.
+        // A part can have any file name.
         Some(_) => {}
         None if args.turntable.is_some() => check_turntable(&args)?,
         None => check_outputs(&args.outputs)?,
     }
     if args.turntable.is_some() && args.shard.is_some() {
         return Err(
-            "--turntable and --shard exclude each other: a turntable is rendered by one machine".to_owned()
+            "--turntable cannot be used with --shard: a turntable is rendered on one machine".to_owned()
         );
     }
     if args.layers.is_some() {
         let why = match (args.once, args.shard) {
-            (false, _) => "--layers needs --once: the terminal shows one layer at a time, by v",
-            (true, Some(_)) => "--layers and --shard exclude each other: parts hold the picture alone",
+            (false, _) => "--layers needs --once: the terminal UI shows one view at a time (key v)",
+            (true, Some(_)) => "--layers cannot be used with --shard: parts contain only the beauty image",
             (true, None) => "",
         };
         if !why.is_empty() {
@@ -69,17 +69,17 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     }
     let mut overrides = args.overrides();
     if overrides.turn.is_some() {
-        // A picture is soon done again; those before it are files.
+        // A single frame is quick to render again, and finished frames are files.
         overrides.checkpoints.seconds = 0.0;
     }
-    if overrides.report.as_deref() == Some(Path::new(STANDARD)) {
+    if overrides.report.as_deref() == Some(Path::new(STDOUT_NAME)) {
         if !args.once {
-            let why = "which has the picture: name a file, or use --once";
-            return Err(format!("--report {STANDARD} is standard output, {why}"));
+            let hint = "pass a file or use --once";
+            return Err(format!("--report {STDOUT_NAME} would write to the terminal UI: {hint}"));
         }
         overrides.report = Some(STDOUT.into());
     }
-    let scene = args.scene.ok_or("no scene is given; see glimt --help")?;
+    let scene = args.scene.ok_or("no scene given; see glimt --help")?;
     Ok(Order {
         scene,
         overrides,
@@ -89,43 +89,41 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         color: args.color,
         poll: args.poll,
         notify_after: args.notify_after,
-        nice: args.nice.unwrap_or(if args.once { 0 } else { POLITE }),
+        nice: args.nice.unwrap_or(if args.once { 0 } else { UI_NICENESS }),
     })
 }
 
-/// Checks that every picture of a turntable has a file, and that the call has no option of a single picture.
+/// Checks that every frame of a turntable has its own file, and that no single-image options are given.
 fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     if !args.once {
-        return Err("--turntable needs --once: the terminal shows one picture".to_owned());
+        return Err("--turntable needs --once: the terminal UI shows one image".to_owned());
     }
     for (is_given, name) in [(args.resume, "--resume"), (args.keep_checkpoint, "--keep-checkpoint")] {
         if is_given {
-            return Err(format!("{name} is for a single picture: a turntable has no checkpoints"));
+            return Err(format!("{name} cannot be used with --turntable, which has no checkpoints"));
         }
     }
     for (index, path) in args.outputs.iter().enumerate() {
         if MovingFormat::of(path).is_none() {
-            Format::of(path).map_err(|error| format!("{error}, or for a turntable of .gif, .apng"))?;
+            Format::of(path).map_err(|error| format!("{error}, or for a turntable .gif, .apng"))?;
         }
         turntable::check_name(path)?;
         check_once(&args.outputs, index)?;
     }
     if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
-        return Err(format!(
-            "{name} would hold two pictures of the turntable: name the files more differently"
-        ));
+        return Err(format!("{name} would be written twice: choose file names that differ more"));
     }
     match &args.report {
-        Some(path) if path != Path::new(STANDARD) && !turntable::has_number(path) => {
+        Some(path) if path != Path::new(STDOUT_NAME) && !turntable::has_number(path) => {
             let name = turntable::suggested(path);
-            Err(format!("a turntable has a report for each picture: --report {}", name.display()))
+            Err(format!("a turntable has one report per frame: use --report {}", name.display()))
         }
         Some(_) | None => Ok(()),
     }
 }
 
-/// Refuses a file that was named before.
+/// Rejects an output given twice.
 fn check_once(outputs: &[PathBuf], index: usize) -> Result<(), String> {
     let path = &outputs[index];
     if outputs[..index].contains(path) {
@@ -134,13 +132,13 @@ fn check_once(outputs: &[PathBuf], index: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Every ending must be known, and no file may be named twice.
+/// Checks that all extensions are known and no output is given twice.
 fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
     for (index, path) in outputs.iter().enumerate() {
         if MovingFormat::of(path).is_some() {
             let name = path.display();
             return Err(format!(
-                "{name} is a moving picture, which --turntable N makes; name a .png for a single one"
+                "{name} is an animation, which needs --turntable N; use .png for a single image"
             ));
         }
         Format::of(path).map_err(|error| error.to_string())?;
@@ -166,12 +164,12 @@ mod tests {
     }
 
     #[test]
-    fn the_definition_is_sound() {
+    fn clap_definition_is_valid() {
         Args::command().debug_assert();
     }
 
     #[test]
-    fn nothing_said_changes_nothing() {
+    fn defaults_override_nothing() {
         let order = lowered("a.toml").expect("right");
         let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
         assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
@@ -181,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn every_option_arrives() {
+    fn every_option_is_lowered() {
         let order = lowered(
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
@@ -222,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_refused() {
+    fn invalid_arguments_are_rejected() {
         for wrong in [
             "",
             "a.toml --samples 0",
@@ -260,9 +258,9 @@ mod tests {
         }
     }
 
-    /// Options accept and refuse the same values as their keys of `[render]`.
+    /// Options accept and reject the same values as their keys of `[render]`.
     #[test]
-    fn options_accept_what_the_keys_accept() {
+    fn options_have_the_ranges_of_their_keys() {
         let command = Args::command();
         for key in description::Render::keys() {
             let name = key.name.replace('_', "-");
@@ -294,14 +292,14 @@ mod tests {
     }
 
     #[test]
-    fn a_command_is_no_scene_unless_it_has_a_folder() {
+    fn scenes_named_like_commands_need_a_folder() {
         let parsed = |words: &[&str]| Args::try_parse_from([&["glimt"], words].concat()).expect("right");
         assert!(matches!(parsed(&["check", "a.toml"]).command, Some(Subcommand::Check { .. })));
         assert_eq!(parsed(&["./check"]).render.scene, Some("./check".into()));
     }
 
     #[test]
-    fn every_view_has_its_name() {
+    fn every_view_has_a_name() {
         for &view in View::ALL {
             let order = lowered(&format!("a.toml --view {}", view.name())).expect("right");
             assert_eq!(order.overrides.view, Some(view));

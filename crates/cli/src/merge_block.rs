@@ -1,6 +1,6 @@
-//! The image of `merge --watch` on a terminal, redrawn in place.
+//! Redraws the image of `merge --watch` in place.
 
-/// Lines at the bottom of the terminal that the next version replaces.
+/// Lines at the bottom of the terminal that are replaced by the next version.
 #[derive(Debug, Default)]
 pub(super) struct Block {
     rows: usize,
@@ -9,8 +9,8 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// The bytes that replace the block with these lines. In a terminal of another width, the old lines have been wrapped to an
-    /// unknown number of rows: they stay.
+    /// Returns the output that replaces the block by `lines`. After a change of the terminal's width, the old lines stay, as they
+    /// may have been rewrapped.
     pub(super) fn redrawn(&mut self, lines: &str, columns: usize) -> String {
         let up = if self.rows > 0 && self.columns == columns {
             format!("\x1b[{}A\r\x1b[J", self.rows)
@@ -27,7 +27,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_block_replaces_itself() {
+    fn blocks_are_redrawn_in_place() {
         let mut block = Block::default();
         assert_eq!(block.redrawn("1 of 3 parts\na\nb\n", 80), "1 of 3 parts\na\nb\n");
         assert_eq!(block.redrawn("2 of 3 parts\n", 80), "\x1b[3A\r\x1b[J2 of 3 parts\n");

@@ -1,4 +1,4 @@
-//! `--once`: render, write, exit; progress on stderr, nothing on stdout.
+//! `--once`: renders, writes the image and exits. Reports progress on stderr and prints nothing to stdout.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,15 +21,19 @@ use crate::signals;
 use crate::system::priority;
 use crate::system::threads::start_failure;
 
-/// Longest time that the end may take after a signal.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// Time after a signal in which a picture that is being written may become whole. Then a checkpoint takes its place.
-const WRITING: Duration = Duration::from_secs(1);
-/// Between two looks for a signal.
+/// Most time to exit after a signal.
+const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Most time after a signal to finish writing an image. After that a checkpoint is written instead.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
+/// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
 
+/// Message after a signal if no image was written.
+pub const NO_IMAGE_WRITTEN: &str = "no image was written";
+
+/// Runs `--once`.
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
-    // Before the first thread starts: all of them give way.
+    // Lower the priority before starting threads, which inherit it.
     priority::lower_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
@@ -38,7 +42,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     let remote = worker.remote();
     let is_again = AtomicBool::new(false);
     let ended = match signals::catch(move || {
-        // The render ends with a checkpoint. What is being written becomes whole, unless a second signal comes.
+        // Stop rendering and save a checkpoint. A file that is being written is finished, unless a second signal arrives.
         remote.send(Command::Suspend);
         if is_again.swap(true, Ordering::Relaxed) {
             remote.send(Command::Cancel);
@@ -48,11 +52,11 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
     let mut deadline = Deadline::default();
-    let mut written = Written::default();
+    let mut written = WrittenFiles::default();
     let has_checkpoints = order.overrides.checkpoints.seconds > 0.0;
     let mut is_over = |is_writing: bool| {
         let now = Instant::now();
-        // Without checkpoints nothing else keeps a picture that is being written.
+        // Without checkpoints, the image being written would be lost.
         let is_lost = is_writing && !has_checkpoints;
         if ended.by().is_some() && !is_lost && deadline.stops_writing(now, is_writing) {
             worker.send(Command::Cancel);
@@ -60,13 +64,13 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         ended.by().is_some() && deadline.is_over(now)
     };
     let (mut exit, mut is_whole) = (Exit::DONE, false);
-    // One reporter for each picture: what a turntable shows of the one before is cleared.
+    // Use one reporter per image, so that progress of the previous frame is cleared.
     let reporter = || progress::reporter(order.progress, order.overrides.time_seconds, console);
-    let mut reporter_of_picture = reporter();
-    for overrides in pictures(&order.overrides) {
+    let mut image_reporter = reporter();
+    for overrides in requests(&order.overrides) {
         let turn = overrides.turn;
-        if let Some(Turn { number, of }) = turn.filter(|_| reporter_of_picture.says_results()) {
-            console.say(&format!("picture {} of {of}", number + 1));
+        if let Some(Turn { number, of }) = turn.filter(|_| image_reporter.says_results()) {
+            console.say(&format!("frame {} of {of}", number + 1));
         }
         worker.send(Command::Render(Box::new(Request {
             generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
@@ -78,8 +82,8 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
             force: false,
             first: None,
         })));
-        reporter_of_picture = reporter();
-        let reporter = &mut *reporter_of_picture;
+        image_reporter = reporter();
+        let reporter = &mut *image_reporter;
         exit = follow(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
         reporter.end();
         is_whole = exit == Exit::DONE && turn.is_none_or(Turn::is_last);
@@ -87,18 +91,18 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
             break;
         }
     }
-    let reporter = reporter_of_picture;
+    let reporter = image_reporter;
     if !reporter.says_diagnostics()
         && let Some(signal) = ended.by().and_then(signals::name)
     {
-        console.say(&format!("ended by {signal}: {}", outcome(is_whole, &written)));
+        console.say(&format!("terminated by {signal}: {}", outcome(is_whole, &written)));
     }
     worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
 }
 
-/// The requests of a call: one, or one for each picture of a turntable.
-fn pictures(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
+/// The requests of a call: one, or one per frame of a turntable.
+fn requests(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     let count = overrides.turn.map_or(1, |turn| turn.of);
     (0..count).map(|number| {
         let turn = overrides.turn.map(|turn| Turn { number, ..turn });
@@ -106,79 +110,79 @@ fn pictures(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     })
 }
 
-/// Words about the pictures when a signal ends the program; `is_whole`: all of them are written.
-fn outcome(is_whole: bool, written: &Written) -> String {
-    let names: Vec<_> = written.pictures.iter().map(|path| path.display().to_string()).collect();
+/// Describes the written images after a signal. `is_whole` means that all were written.
+fn outcome(is_whole: bool, written: &WrittenFiles) -> String {
+    let names: Vec<_> = written.images.iter().map(|path| path.display().to_string()).collect();
     let kept = written
         .checkpoint
         .as_ref()
-        .map(|path| format!("{} has what was rendered; --resume goes on from it", path.display()));
+        .map(|path| format!("progress saved in {}; use --resume to continue", path.display()));
     let words = match names.as_slice() {
-        [] => return kept.unwrap_or_else(|| "no picture was written".to_owned()),
-        [_] if is_whole => return "the picture was written".to_owned(),
-        _ if is_whole => return "the pictures were written".to_owned(),
+        [] => return kept.unwrap_or_else(|| NO_IMAGE_WRITTEN.to_owned()),
+        [_] if is_whole => return "the image was written".to_owned(),
+        _ if is_whole => return "all images were written".to_owned(),
         [only] => format!("only {only} was written"),
-        [first, .., last] => format!("only {} pictures were written, {first} to {last}", names.len()),
+        [first, .., last] => format!("only {} images were written, {first} to {last}", names.len()),
     };
     [words].into_iter().chain(kept).collect::<Vec<_>>().join("; ")
 }
 
 /// Files that were written.
 #[derive(Debug, Default)]
-struct Written {
-    pictures: Vec<PathBuf>,
+struct WrittenFiles {
+    images: Vec<PathBuf>,
     /// The last checkpoint.
     checkpoint: Option<PathBuf>,
 }
 
-/// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
+/// When the program exits regardless of the worker: [`EXIT_TIMEOUT`] after it is first queried.
 #[derive(Debug, Default)]
 struct Deadline {
     end: Option<Instant>,
-    /// Whether the picture that was being written is given up.
+    /// Whether writing an image was cancelled.
     is_write_stopped: bool,
 }
 
 impl Deadline {
     fn is_over(&mut self, now: Instant) -> bool {
-        now >= *self.end.get_or_insert(now + PATIENCE)
+        now >= *self.end.get_or_insert(now + EXIT_TIMEOUT)
     }
 
-    /// Whether what is being written has had its time. The checkpoint of a picture then has as much as after a signal in the render.
-    /// True once.
-    fn stops_writing(&mut self, now: Instant, is_picture: bool) -> bool {
-        let end = *self.end.get_or_insert(now + PATIENCE);
-        if self.is_write_stopped || now + PATIENCE < end + WRITING {
+    /// Returns true once, when writing has taken too long. If an image was being written, this extends the deadline to write a
+    /// checkpoint.
+    fn stops_writing(&mut self, now: Instant, is_image: bool) -> bool {
+        let end = *self.end.get_or_insert(now + EXIT_TIMEOUT);
+        if self.is_write_stopped || now + EXIT_TIMEOUT < end + WRITE_TIMEOUT {
             return false;
         }
         self.is_write_stopped = true;
-        if is_picture {
-            self.end = Some(now + PATIENCE);
+        if is_image {
+            self.end = Some(now + EXIT_TIMEOUT);
         }
         true
     }
 
-    /// Time that the worker may still take.
+    /// Time left for the worker.
     fn left(&self, now: Instant) -> Duration {
-        self.end.map_or(PATIENCE, |end| end.saturating_duration_since(now))
+        self.end.map_or(EXIT_TIMEOUT, |end| end.saturating_duration_since(now))
     }
 }
 
-/// Follows the request until it is over or a signal ends it.
+/// Handles events until the request is finished or a signal ends it.
 fn follow(
     worker: &Handle,
     (order, turn): (&Order, Option<Turn>),
     console: &Console,
     reporter: &mut dyn Reporter,
-    written: &mut Written,
+    written: &mut WrittenFiles,
     mut is_over: impl FnMut(bool) -> bool,
 ) -> Exit {
     let mut is_writing = false;
     let mut unwritten: Vec<String> = Vec::new();
-    let mut of_call: Vec<Diagnostic> = Vec::new();
-    // Warnings about the first picture hold for all.
+    let mut call_warnings: Vec<Diagnostic> = Vec::new();
+    // Warnings about the first frame apply to all.
     let is_first = turn.is_none_or(|turn| turn.number == 0);
-    let before = written.pictures.len();
+    let before = written.images.len();
     loop {
         if is_over(is_writing) {
             return Exit::FAILED;
@@ -186,25 +190,27 @@ fn follow(
         let mut event = match worker.events.recv_timeout(TICK) {
             Ok(event) => event,
             Err(RecvTimeoutError::Timeout) => continue,
-            Err(RecvTimeoutError::Disconnected) => return console.fail(Exit::FAILED, "the worker is gone"),
+            Err(RecvTimeoutError::Disconnected) => {
+                return console.fail(Exit::FAILED, "internal error: the worker thread has exited");
+            }
         };
-        // Warnings about the call come with those about the scene.
+        // Report warnings about the arguments with those about the scene.
         if let Event::Settings { settings, .. } = &event {
-            of_call.extend(without_effect(&order.overrides, settings));
+            call_warnings.extend(without_effect(&order.overrides, settings));
         } else if let Event::Stage { stage, .. } = &event
             && !is_first
             && is_read_again(stage)
         {
             worker.send(Command::Cancel);
             reporter.end();
-            let what = "the scene or a file of it has changed: the pictures would not be of one turntable";
+            let what = "the scene or one of its files changed during the turntable";
             return console.fail(Exit::FAILED, what);
         } else if let Event::Checkpoint { news, .. } = &event {
-            hear(news, &mut of_call, reporter, console);
+            report_checkpoint(news, &mut call_warnings, reporter, console);
         } else if let Event::NotKept { message, .. } = &event {
-            of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
+            call_warnings.push(warning(message, "use -o FILE to keep the old file"));
         } else if let Event::Done { warnings, .. } = &mut event {
-            warnings.append(&mut of_call);
+            warnings.append(&mut call_warnings);
             warnings.retain(|_| is_first);
         }
         if let Event::Stage { stage, .. } = &event {
@@ -212,18 +218,18 @@ fn follow(
         }
         reporter.event(&event);
         match event {
-            Event::Written { path, .. } => written.pictures.push(path),
+            Event::Written { path, .. } => written.images.push(path),
             Event::Checkpoint { news: CheckpointNews::Written { path }, .. } => {
                 written.checkpoint = Some(path);
             }
-            // The report, or one of several pictures; the last picture that cannot be written fails the request.
+            // The report or one of several images. If no image can be written, the request fails.
             Event::WriteFailed { message, .. } => unwritten.push(message),
             Event::Done { report, warnings, .. } => {
                 reporter.end();
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(&report, (&written.pictures[before..], turn), &unwritten, console, reporter);
+                return done(&report, (&written.images[before..], turn), &unwritten, console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -257,13 +263,18 @@ fn follow(
     }
 }
 
-/// Whether a stage that reads files found another content than for the picture before.
+/// Whether a stage that reads files found changes since the previous frame.
 fn is_read_again(stage: &StageReport) -> bool {
     matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
 }
 
-/// Says what a person wants to know about checkpoints, at once: warnings as well, while something can be done.
-fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Reporter, console: &Console) {
+/// Reports checkpoint news immediately, including warnings, while the user can still react.
+fn report_checkpoint(
+    news: &CheckpointNews,
+    call_warnings: &mut Vec<Diagnostic>,
+    reporter: &dyn Reporter,
+    console: &Console,
+) {
     let say = |text: String| {
         if reporter.says_results() {
             console.say(&text);
@@ -271,37 +282,39 @@ fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Rep
     };
     let mut warn = |message: &str, help: &str| {
         if reporter.says_diagnostics() {
-            of_call.push(warning(message, help));
+            call_warnings.push(warning(message, help));
         } else {
             console.diagnostics(&[warning(message, help)]);
         }
     };
     match news {
         CheckpointNews::Written { .. } => {}
-        CheckpointNews::Failed { message } => warn(message, "--checkpoint 0 renders without checkpoints"),
+        CheckpointNews::Failed { message } => {
+            warn(message, "use --checkpoint 0 to render without checkpoints")
+        }
         CheckpointNews::Resumed { path, samples } => {
-            say(format!("going on from {}, after {samples} samples", path.display()));
+            say(format!("Resuming from {} at {samples} samples", path.display()));
         }
         CheckpointNews::Absent { path } => {
-            say(format!("there is no {}: starting from the beginning", path.display()));
+            say(format!("No checkpoint {}; starting from the beginning", path.display()));
         }
         CheckpointNews::Ignored { path } => {
-            let message = format!("{} is of this picture, and is not used", path.display());
-            warn(&message, "--resume goes on from it");
+            let message = format!("ignoring {}, a checkpoint of this image", path.display());
+            warn(&message, "use --resume to continue from it");
         }
         CheckpointNews::Unused { path, why } => {
-            say(format!("{} is not used: {why}; starting from the beginning", path.display()));
+            say(format!("Ignoring {}: {why}; starting from the beginning", path.display()));
         }
         CheckpointNews::Finished { path } => {
-            say(format!("{} is finished already", path.display()));
+            say(format!("{} is already finished", path.display()));
         }
         CheckpointNews::SetAside { path } => {
-            say(format!("the checkpoint of another render is {}", path.display()));
+            say(format!("Saved the checkpoint of another render as {}", path.display()));
         }
     }
 }
 
-/// A warning about the call.
+/// A warning about the arguments.
 fn warning(message: &str, help: &str) -> Diagnostic {
     Diagnostic {
         severity: Severity::Warning,
@@ -312,15 +325,15 @@ fn warning(message: &str, help: &str) -> Diagnostic {
     }
 }
 
-/// Warnings about options without effect. The terminal UI has its own words for these.
+/// Warnings about options without effect. The terminal UI has its own messages for these.
 fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
     let dof = (asked.dof == Some(true) && !settings.dof).then(|| {
-        let help = "give the scene's [camera] an `aperture`, such as 0.1";
-        warning("--dof on has no effect: the scene's camera is a pinhole", help)
+        let help = "set `aperture` of [camera], such as 0.1";
+        warning("--dof on has no effect: the camera's aperture is 0", help)
     });
     let photons = (asked.photons == Some(true) && !settings.photons).then(|| {
-        let help = "`--integrator whitted` gathers photons";
-        warning("--photons on has no effect: path gathers none", help)
+        let help = "use `--integrator whitted`";
+        warning("--photons on has no effect: photons work with whitted only", help)
     });
     dof.into_iter().chain(photons).collect()
 }
@@ -336,7 +349,10 @@ fn done(
         written.iter().for_each(|path| console.say(&wrote(path, report, turn)));
     }
     if let Some(turn) = turn.filter(|turn| turn.is_last()) {
-        written.iter().filter_map(|path| longer(path, turn)).for_each(|message| console.say(&message));
+        written
+            .iter()
+            .filter_map(|path| left_over_warning(path, turn))
+            .for_each(|message| console.say(&message));
     }
     if !reporter.says_diagnostics() {
         unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
@@ -344,12 +360,12 @@ fn done(
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// Says which files of a longer turntable are behind the last picture of this one. `None` if there are none.
-fn longer(last: &Path, turn: Turn) -> Option<String> {
+/// A warning about files left over from an earlier, longer turntable. `None` if there are none.
+fn left_over_warning(last: &Path, turn: Turn) -> Option<String> {
     let left = left_over(last, turn);
     let (first, more) = (left.first()?.display(), left.len() - 1);
     let more = if more == 0 { String::new() } else { format!(" and {more} more") };
-    Some(format!("warning: {first}{more}: of a longer turntable before; they are left as they are"))
+    Some(format!("warning: {first}{more} left over from an earlier, longer turntable"))
 }
 
 fn failed(failure: &Failure, console: &Console) -> Exit {
@@ -367,7 +383,7 @@ fn exit_of(failure: &Failure) -> Exit {
     }
 }
 
-/// `wrote cornell.png (640×480, 64 samples, 1.93 s)`
+/// Describes a written image: `wrote cornell.png (640×480, 64 samples, 1.93 s)`.
 fn wrote(path: &Path, report: &Report, turn: Option<Turn>) -> String {
     let image = &report.image;
     if let Some(turn) = turn.filter(|_| MovingFormat::of(path).is_some()) {
@@ -387,25 +403,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_signal_is_waited_after_once() {
+    fn deadline_starts_at_the_first_query() {
         let signal = Instant::now();
-        let half = signal + PATIENCE / 2;
+        let half = signal + EXIT_TIMEOUT / 2;
         let mut deadline = Deadline::default();
-        assert_eq!(deadline.left(half), PATIENCE, "without a signal");
+        assert_eq!(deadline.left(half), EXIT_TIMEOUT, "without a signal");
         assert!(!deadline.is_over(signal) && !deadline.is_over(half));
-        assert_eq!(deadline.left(half), PATIENCE / 2);
-        assert!(deadline.is_over(signal + PATIENCE));
-        assert_eq!(deadline.left(signal + PATIENCE), Duration::ZERO);
+        assert_eq!(deadline.left(half), EXIT_TIMEOUT / 2);
+        assert!(deadline.is_over(signal + EXIT_TIMEOUT));
+        assert_eq!(deadline.left(signal + EXIT_TIMEOUT), Duration::ZERO);
     }
 
     #[test]
-    fn a_picture_that_is_written_too_slowly_leaves_the_time_of_a_checkpoint() {
+    fn slow_writes_leave_time_for_a_checkpoint() {
         let signal = Instant::now();
-        for (is_picture, end) in [(true, WRITING + PATIENCE), (false, PATIENCE)] {
+        for (is_image, end) in [(true, WRITE_TIMEOUT + EXIT_TIMEOUT), (false, EXIT_TIMEOUT)] {
             let mut deadline = Deadline::default();
-            let mut stops = |after| deadline.stops_writing(signal + after, is_picture);
-            assert!(!stops(Duration::ZERO) && !stops(WRITING / 2));
-            assert!(stops(WRITING) && !stops(PATIENCE), "once");
+            let mut stops = |after| deadline.stops_writing(signal + after, is_image);
+            assert!(!stops(Duration::ZERO) && !stops(WRITE_TIMEOUT / 2));
+            assert!(stops(WRITE_TIMEOUT) && !stops(EXIT_TIMEOUT), "once");
             assert!(!deadline.is_over(signal + end - TICK) && deadline.is_over(signal + end));
         }
     }

@@ -1,4 +1,4 @@
-//! Progress on stderr: bars, plain lines, JSON lines, nothing.
+//! Progress on stderr: bars, plain lines, JSON lines or nothing.
 
 mod bars;
 mod json;
@@ -12,26 +12,26 @@ use crate::pipeline::protocol::{Event, RenderProgress};
 use crate::pipeline::words::samples_so_far;
 pub(super) use crate::pipeline::words::seconds;
 
-/// Says how work goes on.
+/// Reports progress.
 pub(super) trait Reporter {
-    /// Something happened.
+    /// Handles an event.
     fn event(&mut self, event: &Event);
 
-    /// Clear what is not to stay. May be called more than once.
+    /// Clears temporary output. May be called more than once.
     fn end(&mut self) {}
 
-    /// Whether people read what it says: files written are then named at the end.
+    /// Whether written files are reported in text.
     fn says_results(&self) -> bool {
         true
     }
 
-    /// Whether it says errors and warnings itself, so that nothing may be mixed with its lines.
+    /// Whether it reports errors and warnings itself, so nothing else may be printed.
     fn says_diagnostics(&self) -> bool {
         false
     }
 }
 
-/// The reporter that the call chooses; `time` is the budget of the render, if it has one.
+/// Creates the reporter of a progress option. `time` is the time limit of the render.
 pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console) -> Box<dyn Reporter> {
     match progress {
         Progress::Auto if console.is_terminal => Box::new(bars::Bars::new(time)),
@@ -41,7 +41,7 @@ pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console)
     }
 }
 
-/// Samples so far, with the total only if that is certain.
+/// Describes the samples so far, with the total if it is known.
 fn samples(progress: &RenderProgress) -> String {
     if progress.is_total_fixed {
         return format!("{} of {} samples", samples_so_far(progress), progress.total_samples);

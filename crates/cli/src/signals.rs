@@ -1,4 +1,4 @@
-//! SIGINT, SIGTERM and SIGHUP as values.
+//! Handles SIGINT, SIGTERM and SIGHUP.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
@@ -6,17 +6,17 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
-/// The number of the signal that came first, once one came.
+/// The first signal received, if any.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Ended(Arc<AtomicI32>);
+pub(super) struct ReceivedSignal(Arc<AtomicI32>);
 
-impl Ended {
+impl ReceivedSignal {
     pub(super) fn by(&self) -> Option<i32> {
         Some(self.0.load(Ordering::Acquire)).filter(|number| *number != 0)
     }
 }
 
-/// The name of a signal that a person or a program sent; after SIGHUP nobody reads it.
+/// The name of a signal for messages. `None` for SIGHUP, after which there is no terminal.
 pub(super) fn name(number: i32) -> Option<&'static str> {
     match number {
         SIGINT => Some("SIGINT"),
@@ -25,20 +25,20 @@ pub(super) fn name(number: i32) -> Option<&'static str> {
     }
 }
 
-/// From now on these signals call `on_signal` on a thread of their own rather than end the process.
+/// Installs handlers that call `on_signal` on a separate thread instead of terminating the process.
 ///
 /// # Errors
 /// The handlers could not be set up.
-pub(super) fn catch(on_signal: impl Fn() + Send + 'static) -> std::io::Result<Ended> {
+pub(super) fn catch(on_signal: impl Fn() + Send + 'static) -> std::io::Result<ReceivedSignal> {
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
-    let ended = Ended::default();
-    let noted = ended.clone();
+    let received = ReceivedSignal::default();
+    let recorder = received.clone();
     std::thread::Builder::new().name("glimt-signals".to_owned()).spawn(move || {
         for number in &mut signals {
-            // The first one is what the exit code tells.
-            let _ = noted.0.compare_exchange(0, number, Ordering::AcqRel, Ordering::Acquire);
+            // The first signal determines the exit code.
+            let _ = recorder.0.compare_exchange(0, number, Ordering::AcqRel, Ordering::Acquire);
             on_signal();
         }
     })?;
-    Ok(ended)
+    Ok(received)
 }

@@ -1,27 +1,27 @@
-//! Regressions since an older run, and whether they are more than chance.
+//! Compares results with a baseline, with significance tests.
 
-use super::results::{MethodResult, Results, Step};
-use super::statistics::{above, quantile, welch};
+use super::results::{MethodResult, Results, StepResult};
+use super::statistics::{quantile, upper_tail, welch};
 
-/// The part of all comparisons without a change in which one is called a change, over the whole table.
-const FALSE_ALARMS: f64 = 0.01;
+/// Family-wise false positive rate over the whole table.
+const FALSE_POSITIVE_RATE: f64 = 0.01;
 
-/// Change of one quantity of a method on a scene.
+/// Change of time or error of a method on a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Change {
+pub struct MethodChange {
     /// The scene.
     pub scene: String,
     /// The method.
     pub method: String,
-    /// The quantity.
+    /// The compared quantity.
     pub quantity: Quantity,
-    /// Now over then: the geometric mean over the steps.
+    /// New value divided by old value, as geometric mean over the steps.
     pub factor: f64,
-    /// Confidence interval of the factor, 95 %.
+    /// 95 % confidence interval of the factor.
     pub interval: [f64; 2],
-    /// The probability of as large a change, either way, by chance.
+    /// Two-sided p-value of the change.
     pub by_chance: f64,
-    /// Whether that is less than chance explains, over all comparisons.
+    /// Whether the change is significant, with a Bonferroni correction over all comparisons.
     pub is_real: bool,
 }
 
@@ -34,8 +34,9 @@ pub enum Quantity {
     Error,
 }
 
-/// All that both runs have: scenes of the same name and size, methods of the same name, steps of the same samples.
-pub fn changes(then: &Results, now: &Results) -> Vec<Change> {
+/// Compares everything that both runs have: scenes with equal name and size, methods with equal name, and steps with equal
+/// samples.
+pub fn changes(then: &Results, now: &Results) -> Vec<MethodChange> {
     let mut changes = Vec::new();
     for scene in &now.scenes {
         let is_same = |other: &&super::SceneResult| {
@@ -49,13 +50,13 @@ pub fn changes(then: &Results, now: &Results) -> Vec<Change> {
             }
         }
     }
-    let threshold = FALSE_ALARMS / changes.len().max(1) as f64;
+    let threshold = FALSE_POSITIVE_RATE / changes.len().max(1) as f64;
     changes.iter_mut().for_each(|change| change.is_real = change.by_chance < threshold);
     changes
 }
 
-fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quantity) -> Option<Change> {
-    let pairs = now.steps.iter().filter_map(|step| Some((twin(step, &then.steps)?, step)));
+fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quantity) -> Option<MethodChange> {
+    let pairs = now.steps.iter().filter_map(|step| Some((matching_step(step, &then.steps)?, step)));
     let differences: Vec<(f64, f64, f64)> =
         pairs.filter_map(|(old, new)| difference(old, new, quantity)).collect();
     let count = differences.len() as f64;
@@ -66,12 +67,12 @@ fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quanti
     let error = variance.sqrt() / count;
     let freedom = if weights > 0.0 { variance * variance / weights } else { 1.0 };
     let by_chance = match (error > 0.0, mean == 0.0) {
-        (true, _) => 2.0 * above(mean.abs() / error, freedom),
+        (true, _) => 2.0 * upper_tail(mean.abs() / error, freedom),
         (false, true) => 1.0,
         (false, false) => 0.0,
     };
     let reach = quantile(0.025, freedom) * error;
-    (count > 0.0).then(|| Change {
+    (count > 0.0).then(|| MethodChange {
         scene: scene.to_owned(),
         method: now.name.clone(),
         quantity,
@@ -82,17 +83,18 @@ fn change(scene: &str, then: &MethodResult, now: &MethodResult, quantity: Quanti
     })
 }
 
-/// The older step of the same samples, or of the same time.
-fn twin<'a>(step: &Step, then: &'a [Step]) -> Option<&'a Step> {
+/// The baseline's step with the same samples or time.
+fn matching_step<'a>(step: &StepResult, then: &'a [StepResult]) -> Option<&'a StepResult> {
     then.iter().find(|old| match (step.budget, old.budget) {
         (None, None) => old.samples == step.samples,
         (now, then) => now == then,
     })
 }
 
-/// Difference of the mean logarithms, with its standard error and degrees of freedom. `None` if too few values have a logarithm.
-fn difference(then: &Step, now: &Step, quantity: Quantity) -> Option<(f64, f64, f64)> {
-    let of = |step: &Step| -> Vec<f64> {
+/// Difference of the mean logarithms, with its standard error and degrees of freedom. `None` if there are too few positive
+/// values.
+fn difference(then: &StepResult, now: &StepResult, quantity: Quantity) -> Option<(f64, f64, f64)> {
+    let of = |step: &StepResult| -> Vec<f64> {
         let values = step.pictures.iter().map(|picture| match quantity {
             Quantity::Seconds => picture.seconds,
             Quantity::Error => picture.relmse,
@@ -103,49 +105,43 @@ fn difference(then: &Step, now: &Step, quantity: Quantity) -> Option<(f64, f64, 
     if old.len() < 2 || new.len() < 2 {
         return None;
     }
-    // The same pictures have the same errors: that is no chance.
+    // Identical images have identical errors: the difference is exactly 0.
     if old == new { Some((0.0, 0.0, 1.0)) } else { Some(welch(&old, &new)) }
 }
 
-/// The lines that say it.
-pub fn lines(changes: &[Change], name: &str) -> Vec<String> {
+/// Formats the comparison as lines.
+pub fn lines(changes: &[MethodChange], name: &str) -> Vec<String> {
     if changes.is_empty() {
-        return vec![format!(
-            "nothing of {name} can be compared: no scene, size, method and step is in both"
-        )];
+        return vec![format!("{name} has no scene, size, method and step in common with this run")];
     }
-    let mut lines = vec![format!("against {name}, with 95 % confidence:")];
+    let mut lines = vec![format!("compared with {name}, 95 % confidence intervals:")];
     lines.extend(changes.iter().map(line));
-    let sure = (1.0 - FALSE_ALARMS) * 100.0;
+    let sure = (1.0 - FALSE_POSITIVE_RATE) * 100.0;
     lines.push(format!(
-        "not noise: less probable by chance than leaves {sure:.0} % confidence over all lines."
+        "SLOWER, WORSE, faster and better are significant with {sure:.0} % confidence over all lines."
     ));
     lines
 }
 
-fn line(change: &Change) -> String {
-    let Change { scene, method, factor, interval: [low, high], .. } = change;
+fn line(change: &MethodChange) -> String {
+    let MethodChange { scene, method, factor, interval: [low, high], .. } = change;
     let quantity = match change.quantity {
         Quantity::Seconds => "time",
         Quantity::Error => "error",
     };
     let said = match (change.is_real, change.quantity, *factor > 1.0) {
-        (false, _, _) if change.by_chance >= 1.0 => "the same".to_owned(),
+        (false, _, _) if change.by_chance >= 1.0 => "unchanged".to_owned(),
         (false, _, _) => "noise".to_owned(),
-        (true, Quantity::Seconds, true) => format!("SLOWER {}", chance(change.by_chance)),
-        (true, Quantity::Seconds, false) => format!("faster {}", chance(change.by_chance)),
-        (true, Quantity::Error, true) => format!("WORSE {}", chance(change.by_chance)),
-        (true, Quantity::Error, false) => format!("better {}", chance(change.by_chance)),
+        (true, Quantity::Seconds, true) => format!("SLOWER {}", p_value(change.by_chance)),
+        (true, Quantity::Seconds, false) => format!("faster {}", p_value(change.by_chance)),
+        (true, Quantity::Error, true) => format!("WORSE {}", p_value(change.by_chance)),
+        (true, Quantity::Error, false) => format!("better {}", p_value(change.by_chance)),
     };
     format!("  {scene}, {method}: {quantity} × {factor:.3} ({low:.3} to {high:.3}): {said}")
 }
 
-fn chance(probability: f64) -> String {
-    if probability < 1e-6 {
-        "(by chance < 1e-6)".to_owned()
-    } else {
-        format!("(by chance {probability:.0e})")
-    }
+fn p_value(probability: f64) -> String {
+    if probability < 1e-6 { "(p < 1e-6)".to_owned() } else { format!("(p = {probability:.0e})") }
 }
 
 #[cfg(test)]
@@ -153,7 +149,7 @@ mod tests {
     use super::super::results::tests::results;
     use super::*;
 
-    fn with(scale: impl Fn(&mut super::super::Picture, usize)) -> Results {
+    fn with(scale: impl Fn(&mut super::super::ImageResult, usize)) -> Results {
         let mut changed = results();
         for method in changed.scenes.iter_mut().flat_map(|scene| &mut scene.methods) {
             for step in &mut method.steps {
@@ -164,17 +160,17 @@ mod tests {
     }
 
     #[test]
-    fn the_same_is_the_same() {
+    fn identical_runs_have_no_changes() {
         let found = changes(&results(), &results());
         assert_eq!(found.len(), 2 * 2 * 2);
         assert!(
             found.iter().all(|change| !change.is_real && change.factor == 1.0 && change.by_chance == 1.0)
         );
-        assert!(lines(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): the same"));
+        assert!(lines(&found, "old.json")[1].ends_with("time × 1.000 (1.000 to 1.000): unchanged"));
     }
 
     #[test]
-    fn a_large_change_is_found_and_noise_is_not() {
+    fn large_changes_are_significant() {
         let slower = with(|picture, _| picture.seconds *= 1.5);
         let found = changes(&results(), &slower);
         let of = |quantity| found.iter().filter(move |change| change.quantity == quantity);
@@ -188,24 +184,18 @@ mod tests {
         );
         assert!(of(Quantity::Error).all(|change| !change.is_real));
         let said = lines(&found, "old.json").join("\n");
-        assert!(
-            said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (by chance"),
-            "{said}"
-        );
+        assert!(said.contains("a.toml, path: time × 1.500 (1.3") && said.contains("SLOWER (p "), "{said}");
         let noise = with(|picture, number| picture.seconds *= [1.05, 0.97, 0.99][number]);
         assert!(changes(&results(), &noise).iter().all(|change| !change.is_real));
     }
 
     #[test]
-    fn only_what_both_have_is_compared() {
+    fn only_common_steps_are_compared() {
         let mut other = results();
         other.scenes[0].scene = "other.toml".to_owned();
         other.scenes[1].methods[0].name = "other".to_owned();
         other.scenes[1].methods[1].steps.truncate(1);
         assert_eq!(changes(&other, &results()).len(), 2);
-        assert_eq!(
-            lines(&[], "x.json"),
-            ["nothing of x.json can be compared: no scene, size, method and step is in both"]
-        );
+        assert!(matches!(&lines(&[], "x.json")[..], [line] if line.starts_with("x.json ")));
     }
 }

@@ -1,58 +1,64 @@
-//! Bias of a method: the error that many pictures by it share, and that the references do not have.
+//! Bias of a method: the error that images with different seeds share, and that the references do not have.
 //!
-//! The mean over all pairs of different seeds of (xᵢ − r₁)(xⱼ − r₂) is the square of the bias, as the noise of all four is
-//! independent. How far it is from 0 by chance is estimated from how the pairs differ, from what leaving each seed out changes,
-//! and from the noise of the references.
+//! The mean of (xᵢ − r₁)(xⱼ − r₂) over all pairs of different seeds estimates the squared bias, as the noise of all four images is
+//! independent. Its standard error is estimated from the variance of the pairs, from the jackknife over seeds, and from the noise
+//! of the references.
 
 use serde::{Deserialize, Serialize};
 
-use super::statistics::{above, quantile};
+use super::statistics::{quantile, upper_tail};
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 
-/// The part of all cases without bias in which one is found.
-pub const FALSE_ALARMS: f64 = 0.001;
-/// Seeds that it takes to tell.
-pub const LEAST_SEEDS: usize = 3;
+/// Significance level of the test for bias.
+pub const FALSE_POSITIVE_RATE: f64 = 0.001;
+/// Fewest seeds needed to estimate a bias.
+pub const MIN_SEEDS: usize = 3;
 
-/// An estimate of a bias.
+/// An estimated bias.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bias {
-    /// Square of the bias, as a part of relMSE; by chance below 0 if there is none.
+    /// Squared bias, as a contribution to relMSE. May be negative due to noise.
     pub size: f64,
-    /// Its standard error.
+    /// Standard error of the size.
     pub error: f64,
-    /// The probability that there is as much without a bias.
+    /// One-sided p-value of the hypothesis of no bias.
     pub by_chance: f64,
-    /// One that were larger would have been found.
+    /// Upper confidence bound of the size.
     pub bound: f64,
 }
 
 impl Bias {
-    /// Whether chance is no explanation.
+    /// Whether the bias is significant.
     pub fn is_found(&self) -> bool {
-        self.by_chance < FALSE_ALARMS
+        self.by_chance < FALSE_POSITIVE_RATE
     }
 }
 
-/// The bias of pictures of different seeds; none for fewer than [`LEAST_SEEDS`].
+/// Estimates the bias from images with different seeds. `None` for fewer than [`MIN_SEEDS`].
 pub fn bias(references: &TwoReferences, pictures: &[RadianceImage]) -> Option<Bias> {
-    if pictures.len() < LEAST_SEEDS {
+    if pictures.len() < MIN_SEEDS {
         return None;
     }
     let pairs = Pairs::of(references, pictures);
     let by_references = references.uncertainty(&mean_of(pictures));
-    let by_seeds = pairs.variance_without_bias().max(pairs.variance_by_leaving_out());
+    let by_seeds = pairs.variance_without_bias().max(pairs.jackknife_variance());
     let (size, error) = (pairs.mean(), (by_seeds + by_references * by_references).sqrt());
     let freedom = pictures.len() as f64 - 1.0;
-    let by_chance = if error > 0.0 { above(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
-    Some(Bias { size, error, by_chance, bound: size.max(0.0) + quantile(FALSE_ALARMS, freedom) * error })
+    let by_chance =
+        if error > 0.0 { upper_tail(size / error, freedom) } else { f64::from(u8::from(size <= 0.0)) };
+    Some(Bias {
+        size,
+        error,
+        by_chance,
+        bound: size.max(0.0) + quantile(FALSE_POSITIVE_RATE, freedom) * error,
+    })
 }
 
-/// Products of the errors of each two pictures.
+/// Products of the errors of pairs of images.
 struct Pairs {
     count: usize,
-    /// With the numbers of the two.
+    /// Indices of both images, and the product.
     products: Vec<(usize, usize, f64)>,
 }
 
@@ -75,7 +81,7 @@ impl Pairs {
         sum / count
     }
 
-    /// Variance of the mean: without a bias the products of different pairs are uncorrelated.
+    /// Variance of the mean if there is no bias: then the products of different pairs are uncorrelated.
     fn variance_without_bias(&self) -> f64 {
         let (mean, count) = (self.mean(), self.products.len() as f64);
         let squares: f64 =
@@ -83,8 +89,8 @@ impl Pairs {
         squares / (count - 1.0) / count
     }
 
-    /// Variance of the mean, by the jackknife.
-    fn variance_by_leaving_out(&self) -> f64 {
+    /// Jackknife estimate of the variance of the mean.
+    fn jackknife_variance(&self) -> f64 {
         let (mean, count) = (self.mean(), self.count as f64);
         let squares = (0..self.count).map(|seed| self.mean_without(seed) - mean);
         squares.map(|difference| difference * difference).sum::<f64>() * (count - 1.0) / count
@@ -108,7 +114,7 @@ mod tests {
     use crate::compare::Pair;
     use crate::math::Vec3;
 
-    /// Numbers that look random: SplitMix64.
+    /// Pseudorandom numbers (SplitMix64).
     struct Noise(u64);
 
     impl Noise {
@@ -120,7 +126,7 @@ mod tests {
             ((mixed ^ (mixed >> 31)) >> 40) as f32 / (1 << 23) as f32 - 1.0
         }
 
-        /// Gray of 0.5 + offset; blocks of `block`² pixels share their noise, as the light of a photon is spread.
+        /// Gray of 0.5 + offset with noise. Blocks of `block`² pixels share their noise, like pixels lit by the same photon.
         fn picture(&mut self, noise: f32, offset: f32, block: u32) -> RadianceImage {
             const SIDE: u32 = 32;
             let mut picture = RadianceImage::black(SIDE, SIDE);
@@ -145,17 +151,17 @@ mod tests {
     }
 
     #[test]
-    fn in_noise_none_is_found_as_often_as_said() {
+    fn false_positive_rate_is_as_specified() {
         for (seeds, block) in [(3, 1), (6, 1), (6, 4), (6, 16)] {
             let mut noise = Noise(seeds as u64 * 1000 + u64::from(block));
             let alarms = (0..1000).filter(|_| noise.found(seeds, 0.0, block).is_found()).count();
-            // One is expected; of a Poisson distribution more than six come once in ten thousand times.
+            // One is expected. A Poisson variable exceeds six once in ten thousand times.
             assert!(alarms <= 6, "{seeds} seeds, blocks of {block}: {alarms} false alarms of 1000");
         }
     }
 
     #[test]
-    fn a_planted_bias_is_found_with_its_size() {
+    fn known_bias_is_found_with_its_size() {
         let mut noise = Noise(7);
         let truth = 0.06_f64.powi(2) / 0.26;
         let mut sizes = Vec::new();
@@ -169,20 +175,23 @@ mod tests {
     }
 
     #[test]
-    fn the_standard_error_is_that_of_many_tries() {
+    fn standard_error_matches_repeated_trials() {
         let mut noise = Noise(11);
         for offset in [0.0, 0.04] {
             let tries: Vec<Bias> = (0..200).map(|_| noise.found(6, offset, 1)).collect();
             let sizes: Vec<f64> = tries.iter().map(|found| found.size).collect();
             let (_, error) = super::super::statistics::mean(&sizes);
-            let seen = error * (sizes.len() as f64).sqrt();
-            let said = tries.iter().map(|found| found.error).sum::<f64>() / tries.len() as f64;
-            assert!(said > 0.85 * seen && said < 2.0 * seen, "{offset}: said {said}, seen {seen}");
+            let actual = error * (sizes.len() as f64).sqrt();
+            let estimated = tries.iter().map(|found| found.error).sum::<f64>() / tries.len() as f64;
+            assert!(
+                estimated > 0.85 * actual && estimated < 2.0 * actual,
+                "{offset}: estimated {estimated}, actual {actual}"
+            );
         }
     }
 
     #[test]
-    fn exact_pictures_have_none_and_exact_wrong_ones_have_theirs() {
+    fn noise_free_images_have_exact_bias() {
         let mut noise = Noise(1);
         let pair = Pair::new(
             [Path::new("a"), Path::new("b")],

@@ -1,48 +1,48 @@
-//! Whether pictures are brighter or darker than the references on average: a bias that all pixels share is small in each square of
-//! relMSE, and large beside the noise of the mean.
+//! Detects images that are brighter or darker than the references on average. A bias shared by all pixels is small in relMSE, but
+//! large compared with the noise of the mean.
 
 use serde::{Deserialize, Serialize};
 
-use super::bias::{FALSE_ALARMS, LEAST_SEEDS};
-use super::statistics::{above, mean};
+use super::bias::{FALSE_POSITIVE_RATE, MIN_SEEDS};
+use super::statistics::{mean, upper_tail};
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 use crate::math::DVec3;
 use crate::math::color::LUMINANCE_WEIGHTS;
 
-/// Relative difference in brightness between pictures and references.
+/// Relative difference in brightness between images and references.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Brightness {
-    /// The difference, as a part of the mean luminance of the references.
+    /// The difference, relative to the mean luminance of the references.
     pub value: f64,
     /// Its standard error.
     pub error: f64,
-    /// The probability that it is as far from 0 without a bias.
+    /// Two-sided p-value of the hypothesis of no bias.
     pub by_chance: f64,
 }
 
 impl Brightness {
-    /// Whether chance is no explanation.
+    /// Whether the bias is significant.
     pub fn is_biased(&self) -> bool {
-        self.by_chance < FALSE_ALARMS
+        self.by_chance < FALSE_POSITIVE_RATE
     }
 }
 
-/// The brightness of pictures of different seeds, whose pixels err apart from each other or, by photons, together; none for fewer
-/// than [`LEAST_SEEDS`], and beside references that are black.
+/// Compares the brightness of images with different seeds with the references. With photons, errors of pixels are correlated and
+/// `are_pixels_independent` must be false. `None` for fewer than [`MIN_SEEDS`] images or black references.
 pub fn brightness(
     references: &TwoReferences,
     pictures: &[RadianceImage],
-    are_pixels_apart: bool,
+    are_pixels_independent: bool,
 ) -> Option<Brightness> {
-    if pictures.len() < LEAST_SEEDS || !(references.mean_luminance() > 0.0) {
+    if pictures.len() < MIN_SEEDS || !(references.mean_luminance() > 0.0) {
         return None;
     }
     let values: Vec<f64> = pictures.iter().map(|picture| references.brightness(picture)).collect();
     let (value, by_seeds) = mean(&values);
     let seeds = pictures.len() as f64 - 1.0;
-    let (of_pictures, freedom) = if are_pixels_apart {
-        // All pixels tell how large the noise is, not some seeds alone.
+    let (of_pictures, freedom) = if are_pixels_independent {
+        // Estimate the noise from all pixels, not just from a few seeds.
         (error_of_pixels(pictures) / references.mean_luminance(), seeds * pictures[0].pixels.len() as f64)
     } else {
         (by_seeds, seeds)
@@ -50,13 +50,13 @@ pub fn brightness(
     let of_references = references.brightness_uncertainty();
     let error = (of_pictures * of_pictures + of_references * of_references).sqrt();
     let by_chance = match error > 0.0 {
-        true => 2.0 * above(value.abs() / error, freedom),
+        true => 2.0 * upper_tail(value.abs() / error, freedom),
         false => f64::from(u8::from(value == 0.0)),
     };
     Some(Brightness { value, error, by_chance })
 }
 
-/// The standard error of the mean luminance of all pictures, by the spread of each pixel.
+/// The standard error of the mean luminance of all images, from the variance of each pixel.
 fn error_of_pixels(pictures: &[RadianceImage]) -> f64 {
     let count = pictures.len() as f64;
     let weights: DVec3 = LUMINANCE_WEIGHTS.as_dvec3();
@@ -81,7 +81,7 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// Gray of 0.5, brighter by a part, with noise of each pixel or of the whole picture.
+    /// Gray of 0.5 · (1 + `brighter`), with independent noise per pixel and shared noise of the whole image.
     fn picture(next: &mut impl FnMut() -> f32, brighter: f32, noise: f32, shared: f32) -> RadianceImage {
         let all = shared * (2.0 * next() - 1.0);
         let pixels = (0..SIDE * SIDE)
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn one_percent_too_dark_is_found_where_relmse_hides_it() {
+    fn one_percent_of_darkening_is_found() {
         const SEEDS: u32 = 40;
         let (mut off, mut missed) = (Vec::new(), 0);
         for seed in 1..=SEEDS {
@@ -107,11 +107,11 @@ mod tests {
             missed += u32::from(!found.is_biased());
             off.push((found.value + 0.01) / found.error);
             let by_relmse = bias(&references, &pictures).expect("enough seeds");
-            assert!(!by_relmse.is_found(), "{seed}: or this test tells nothing");
+            assert!(!by_relmse.is_found(), "{seed}: relMSE must not find it");
         }
-        // One percent is 4.7 standard errors here and the threshold is 3.3: 8 % are missed, 3.3 of 40, by chance up to 8.
+        // One percent is 4.7 standard errors and the threshold is 3.3, so 8 % are missed: 3.3 of 40 on average, at most 8.
         assert!(missed <= 8, "{missed}");
-        // In standard errors: as often above as below, and as large as they say.
+        // The normalized errors have mean 0 and standard deviation 1.
         let count = f64::from(SEEDS);
         let mean = off.iter().sum::<f64>() / count;
         let spread = (off.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt();
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_no_bias_whether_pixels_share_it_or_not() {
+    fn noise_is_not_mistaken_for_bias() {
         for (noise, shared) in [(0.2, 0.0), (0.02, 0.02)] {
             let mut next = unit(5);
             let alarms = (0..200).filter(|_| {
@@ -128,14 +128,14 @@ mod tests {
                 let pictures: Vec<_> = (0..4).map(|_| picture(&mut next, 0.0, noise, shared)).collect();
                 brightness(&references, &pictures, shared == 0.0).expect("enough seeds").is_biased()
             });
-            // 0.2 are expected; four or more come once in ten thousand times.
+            // 0.2 are expected. Four or more occur once in ten thousand times.
             let alarms = alarms.count();
             assert!(alarms <= 3, "{noise} {shared}: {alarms} false alarms of 200");
         }
     }
 
     #[test]
-    fn few_pictures_and_black_references_tell_nothing() {
+    fn few_images_and_black_references_give_none() {
         let mut next = unit(7);
         let references = references(&mut next);
         let pictures: Vec<_> = (0..2).map(|_| picture(&mut next, 0.0, 0.1, 0.0)).collect();

@@ -1,6 +1,6 @@
-//! References on disk: one file for each fingerprint, which says by itself whether it is whole.
+//! Cached references: one file per fingerprint, with a checksum.
 //!
-//! A line of JSON, the pixels of both pictures as little-endian floats, and the fingerprint of all before it.
+//! A file consists of a line of JSON, the pixels of both images as little-endian floats, and the fingerprint of all preceding bytes.
 
 use std::fs;
 use std::io::Read;
@@ -16,83 +16,84 @@ use crate::output::write::Guard;
 use crate::output::{Losses, OutputError, staged, write};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// The folder for references: below `XDG_CACHE_HOME`, else `~/.cache`. `None` if neither is set.
+/// The folder for references, in `XDG_CACHE_HOME` or `~/.cache`. `None` if neither is set.
 pub fn folder() -> Option<PathBuf> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let caches = absolute("XDG_CACHE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".cache")))?;
     Some(caches.join("glimt").join("references"))
 }
 
-/// The scene that `glimt new` writes, as a file below this folder. Files that exist stay as they are.
+/// Writes the starter scene to a file in a subfolder and returns its path. Never overwrites files.
 ///
 /// # Errors
-/// The folder cannot be made, the file cannot be written, or another one has its name.
+/// The folder or the file cannot be created, or another file has this name.
 pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
     let text = crate::scene::starter().as_bytes();
-    // Each version of the scene has its own folder: a scene file next to the references may be the user's.
+    // Use a folder per version of the scene, as a scene next to the references may be the user's.
     let folder = folder
         .join(format!("starter-{}", &Fingerprint::new("starter").bytes(text).finish().to_string()[..16]));
-    make(&folder)?;
+    create(&folder)?;
     let path = folder.join("starter.toml");
     let is_there = || fs::read(&path).is_ok_and(|found| found == text);
     if is_there() {
         return Ok(path);
     }
     match staged::new_files(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
-        // Another process may have written it meanwhile.
+        // Another process may have written it in the meantime.
         Err(_) if is_there() => Ok(path),
         Err(_) if path.symlink_metadata().is_ok() => Err(refused(&path, "the starter scene")),
         written => written.map(|()| path),
     }
 }
 
-/// A file that glimt did not write has this name.
+/// The error about a file that was not written by glimt.
 fn refused(path: &Path, what: &str) -> OutputError {
     let reason = format!(
-        "cannot write {}: the file of this name is not {what}; move it away, or name another folder with --cache",
+        "cannot write {}: the existing file is not {what}; move it or choose another folder with --cache",
         path.display()
     );
     OutputError::Refused { reason }
 }
 
-fn make(folder: &Path) -> Result<(), OutputError> {
+fn create(folder: &Path) -> Result<(), OutputError> {
     fs::create_dir_all(folder).map_err(|source| OutputError::File { path: folder.to_owned(), source })
 }
 
-/// Two references with what they cost.
+/// Two references with their cost.
 #[derive(Clone, Debug)]
-pub(super) struct Stored {
+pub(super) struct CachedReferences {
     pub(super) pair: Pair,
-    pub(super) cost: Cost,
+    pub(super) cost: ReferenceCost,
 }
 
-/// Cost of two references.
+/// Rendering cost of two references.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Cost {
-    /// Samples per pixel of each, on average.
+pub(super) struct ReferenceCost {
+    /// Average samples per pixel of each.
     pub(super) samples: f64,
-    /// Seconds of rendering, of both.
+    /// Total rendering time in seconds.
     pub(super) seconds: f64,
 }
 
+/// The JSON line of a cache file.
 #[derive(Serialize, Deserialize)]
-struct Head {
+struct CacheHeader {
     width: u32,
     height: u32,
-    cost: Cost,
+    cost: ReferenceCost,
 }
 
 const KEY_BYTES: usize = 64;
 
-/// References stored under a key. `None` for a missing file or one that is not whole.
-pub(super) fn load(folder: &Path, key: &Key) -> Option<Stored> {
+/// Loads the references stored under a key. `None` if the file is missing or damaged.
+pub(super) fn load(folder: &Path, key: &Key) -> Option<CachedReferences> {
     let bytes = fs::read(file(folder, key)).ok()?;
     let (content, seal) = bytes.split_at_checked(bytes.len().checked_sub(KEY_BYTES)?)?;
     if seal_of(content).as_bytes() != seal {
         return None;
     }
     let end = content.iter().position(|byte| *byte == b'\n')?;
-    let Head { width, height, cost } = serde_json::from_slice(&content[..end]).ok()?;
+    let CacheHeader { width, height, cost } = serde_json::from_slice(&content[..end]).ok()?;
     let (floats, _) = content[end + 1..].as_chunks();
     let values: Vec<f32> = floats.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let pixels: Vec<Vec3> =
@@ -103,18 +104,18 @@ pub(super) fn load(folder: &Path, key: &Key) -> Option<Stored> {
     }
     let image = |pixels: &[Vec3]| RadianceImage { width, height, pixels: pixels.to_vec() };
     let pair = Pair::new([folder, folder], image(&pixels[..count]), image(&pixels[count..])).ok()?;
-    Some(Stored { pair, cost })
+    Some(CachedReferences { pair, cost })
 }
 
-/// Keep this.
+/// Stores references under a key.
 ///
 /// # Errors
-/// The folder cannot be made or the file not be written.
-pub(super) fn store(folder: &Path, key: &Key, stored: &Stored) -> Result<(), OutputError> {
+/// The folder cannot be created or the file cannot be written.
+pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Result<(), OutputError> {
     let path = file(folder, key);
-    make(folder)?;
+    create(folder)?;
     let (a, b) = (stored.pair.a(), stored.pair.b());
-    let head = Head { width: a.width, height: a.height, cost: stored.cost };
+    let head = CacheHeader { width: a.width, height: a.height, cost: stored.cost };
     let mut bytes = serde_json::to_vec(&head)
         .map_err(|error| OutputError::File { path: path.clone(), source: error.into() })?;
     bytes.push(b'\n');
@@ -129,14 +130,14 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &Stored) -> Result<(), Out
     write::atomic_until(&path, &bytes, &guard, &CancelToken::new())
 }
 
-/// Whether a file is missing, empty, or a reference, damaged or not.
+/// Whether a file is missing, empty, or a possibly damaged reference.
 fn is_replaceable(path: &Path) -> bool {
     const HEAD_BYTES: u64 = 1 << 10;
     let Ok(file) = fs::File::open(path) else { return path.symlink_metadata().is_err() };
     let mut start = Vec::new();
     let is_read = file.take(HEAD_BYTES).read_to_end(&mut start).is_ok();
     let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    is_read && (start.is_empty() || serde_json::from_slice::<Head>(line).is_ok())
+    is_read && (start.is_empty() || serde_json::from_slice::<CacheHeader>(line).is_ok())
 }
 
 fn seal_of(content: &[u8]) -> String {
@@ -151,15 +152,15 @@ fn file(folder: &Path, key: &Key) -> PathBuf {
 mod tests {
     use super::*;
 
-    fn stored() -> Stored {
+    fn stored() -> CachedReferences {
         let image =
             |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
-        Stored { pair, cost: Cost { samples: 12.5, seconds: 3.25 } }
+        CachedReferences { pair, cost: ReferenceCost { samples: 12.5, seconds: 3.25 } }
     }
 
     #[test]
-    fn files_of_others_are_kept() {
+    fn foreign_files_are_never_replaced() {
         let folder = tempfile::tempdir().expect("a folder");
         let own = folder.path().join("starter.toml");
         fs::write(&own, "a scene of the user").expect("written");
@@ -169,9 +170,9 @@ mod tests {
         assert_eq!(starter(folder.path()).expect("it exists"), scene);
         fs::write(&scene, "edited").expect("written");
         let why = starter(folder.path()).expect_err("edited").to_string();
-        assert!(why.contains("is not the starter scene") && why.contains("--cache"), "{why}");
+        assert!(why.contains("starter.toml") && why.contains("--cache"), "{why}");
         assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
-        // References replace references only.
+        // References only replace references.
         let key = Fingerprint::new("x").finish();
         let path = file(folder.path(), &key);
         fs::write(&path, "notes").expect("written");
@@ -187,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_stored_comes_back_to_the_last_bit() {
+    fn stored_references_are_restored_exactly() {
         let folder = tempfile::tempdir().expect("a folder");
         let folder = folder.path().join("not/there/yet");
         let key = Fingerprint::new("x").finish();
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_is_wrong_with_a_file_it_is_as_good_as_none() {
+    fn damaged_files_are_ignored() {
         let folder = tempfile::tempdir().expect("a folder");
         let key = Fingerprint::new("x").finish();
         store(folder.path(), &key, &stored()).expect("stored");
@@ -218,6 +219,6 @@ mod tests {
         }
         let lie = b"{\"width\":4,\"height\":4,\"cost\":{\"samples\":1.0,\"seconds\":1.0}}\n".to_vec();
         fs::write(&path, [lie.clone(), seal_of(&lie).into_bytes()].concat()).expect("written");
-        assert!(load(folder.path(), &key).is_none(), "fewer pixels than it says");
+        assert!(load(folder.path(), &key).is_none(), "fewer pixels than in the header");
     }
 }

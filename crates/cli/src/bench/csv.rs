@@ -1,12 +1,12 @@
-//! One line for each picture (RFC 4180), for programs that draw and compute.
+//! CSV output with one line per image (RFC 4180).
 
 use super::results::Results;
 
-/// The first line, with its end.
+/// The header line, with its line end.
 pub const HEAD: &str =
     "scene,width,height,method,step,seed,samples,seconds,setup_seconds,relmse,reference_noise\r\n";
 
-/// The text of the file.
+/// Formats the results as CSV.
 pub fn csv(results: &Results) -> String {
     let mut text = HEAD.to_owned();
     for scene in &results.scenes {
@@ -27,7 +27,7 @@ pub fn csv(results: &Results) -> String {
     text
 }
 
-/// A text within quotes, where it needs them.
+/// Quotes a field if necessary.
 fn field(text: &str) -> String {
     if text.contains(['"', ',', '\r', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_picture_has_a_line_with_all_fields() {
+    fn every_image_has_a_line_with_all_fields() {
         let mut results = results();
         results.scenes[1].scene = "odd, \"name\".toml".to_owned();
         let text = csv(&results);

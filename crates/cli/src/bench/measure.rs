@@ -1,15 +1,15 @@
-//! One method on a scene: step after step, seed after seed.
+//! Measures one method on a scene, for all steps and seeds.
 
 use super::bias::bias;
 use super::brightness::brightness;
 use super::methods::Method;
-use super::order::{Steps, Trouble};
-use super::pace::Pace;
-use super::reference::{Keys, SEEDS};
-use super::results::{MethodResult, Picture, Step};
-use super::run::Run;
+use super::reference::{ReferenceKeys, SEEDS};
+use super::request::{BenchError, StepSchedule};
+use super::results::{ImageResult, MethodResult, StepResult};
+use super::run::SceneRun;
 use super::statistics::median;
 use super::table::{error, samples};
+use super::time_budget::TimeBudget;
 use crate::compare::TwoReferences;
 use crate::film::RadianceImage;
 use crate::pipeline::protocol::{Failure, Report, Stage};
@@ -17,90 +17,102 @@ use crate::pipeline::session::{Rendered, Session};
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::words;
 
-/// From step to step of a ladder that is not given.
-const FACTOR: u32 = 4;
+/// Ratio of the samples of consecutive steps by default.
+const SAMPLE_RATIO: u32 = 4;
 
-/// One step that is to be made.
+/// Target of one step.
 #[derive(Clone, Copy)]
-struct Aim {
+struct StepTarget {
     index: u32,
     samples: u32,
     budget: Option<f64>,
 }
 
-/// A method on a scene.
-pub(super) struct Measure<'a> {
-    pub(super) run: &'a Run<'a>,
-    /// Overrides that all pictures share with the references.
+/// Measurement of a method on a scene.
+pub(super) struct MethodRun<'a> {
+    pub(super) run: &'a SceneRun<'a>,
+    /// Overrides shared by all images and the references.
     pub(super) common: &'a Overrides,
     pub(super) method: &'a Method,
-    /// Keys of the references.
-    pub(super) keys: &'a Keys,
+    /// ReferenceKeys of the references.
+    pub(super) keys: &'a ReferenceKeys,
     pub(super) two: &'a TwoReferences,
-    /// To which a ladder without given steps climbs.
+    /// Most samples of a step by default.
     pub(super) most_samples: f64,
 }
 
-impl Measure<'_> {
-    /// Measures it; notes how many threads rendered.
-    pub(super) fn measure(&self, pace: &Pace, threads: &mut usize) -> Result<MethodResult, Trouble> {
+impl MethodRun<'_> {
+    /// Measures the method. Sets `threads` to the number of rendering threads.
+    pub(super) fn measure(
+        &self,
+        budget: &TimeBudget,
+        threads: &mut usize,
+    ) -> Result<MethodResult, BenchError> {
         let mut session = Session::default();
-        // What is made once is made here, and the first picture that counts finds warm caches.
-        let begin = Aim { index: 0, samples: 1, budget: None };
+        // Warm the caches before the first measured image.
+        let begin = StepTarget { index: 0, samples: 1, budget: None };
         let first = self.render(&mut session, SEEDS[0], begin)?;
         *threads = first.report.settings.threads;
-        let mut steps: Vec<Step> = Vec::new();
+        let mut steps: Vec<StepResult> = Vec::new();
         let mut took = Vec::new();
-        while let Some(aim) = self.next(&steps, &took, pace) {
-            let before = pace.of_method();
-            steps.push(self.step(&mut session, aim, pace, &took)?);
-            took.push(pace.of_method() - before);
+        while let Some(aim) = self.next(&steps, &took, budget) {
+            let before = budget.method_seconds();
+            steps.push(self.step(&mut session, aim, budget, &took)?);
+            took.push(budget.method_seconds() - before);
         }
         let last = self.render(&mut session, SEEDS[0], begin)?;
-        if last.key != first.key || self.run.maker(self.common).keys(&mut session)? != *self.keys {
+        if last.key != first.key || self.run.reference_renderer(self.common).keys(&mut session)? != *self.keys
+        {
             return Err(self.run.changed());
         }
         Ok(MethodResult::new(self.method.name.clone(), setup(&first.report), steps))
     }
 
-    /// The next step after these, which took so many seconds each.
-    fn next(&self, steps: &[Step], took: &[f64], pace: &Pace) -> Option<Aim> {
+    /// The target of the next step, given the previous steps and their durations in seconds.
+    fn next(&self, steps: &[StepResult], took: &[f64], budget: &TimeBudget) -> Option<StepTarget> {
         let index = steps.len() as u32;
         match &self.run.order.steps {
-            Steps::Samples(list) => {
-                list.get(steps.len()).map(|&samples| Aim { index, samples, budget: None })
+            StepSchedule::Samples(list) => {
+                list.get(steps.len()).map(|&samples| StepTarget { index, samples, budget: None })
             }
-            Steps::Seconds(list) => {
-                let aim = |&seconds| Aim { index, samples: u32::MAX, budget: Some(seconds) };
+            StepSchedule::Seconds(list) => {
+                let aim = |&seconds| StepTarget { index, samples: u32::MAX, budget: Some(seconds) };
                 list.get(steps.len()).map(aim)
             }
-            Steps::Climb => {
-                let samples =
-                    FACTOR.checked_pow(index).filter(|samples| f64::from(*samples) <= self.most_samples)?;
-                let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(FACTOR));
-                let has_time = pace.of_method() + expected <= pace.allowance();
-                (index == 0 || has_time).then_some(Aim { index, samples, budget: None })
+            StepSchedule::Climb => {
+                let samples = SAMPLE_RATIO
+                    .checked_pow(index)
+                    .filter(|samples| f64::from(*samples) <= self.most_samples)?;
+                let expected = took.last().map_or(0.0, |seconds| seconds * f64::from(SAMPLE_RATIO));
+                let has_time = budget.method_seconds() + expected <= budget.method_allowance();
+                (index == 0 || has_time).then_some(StepTarget { index, samples, budget: None })
             }
         }
     }
 
-    fn step(&self, session: &mut Session, aim: Aim, pace: &Pace, took: &[f64]) -> Result<Step, Trouble> {
+    fn step(
+        &self,
+        session: &mut Session,
+        aim: StepTarget,
+        budget: &TimeBudget,
+        took: &[f64],
+    ) -> Result<StepResult, BenchError> {
         let seeds = self.run.order.seeds;
-        let (mut pictures, mut images): (Vec<Picture>, Vec<RadianceImage>) = Default::default();
-        let mut are_pixels_apart = true;
+        let (mut pictures, mut images): (Vec<ImageResult>, Vec<RadianceImage>) = Default::default();
+        let mut are_pixels_independent = true;
         for number in 0..seeds {
             let seed = self.run.order.seed + aim.index * seeds + number;
-            self.say_picture(aim, number, pace, took, &pictures);
+            self.report_image(aim, number, budget, took, &pictures);
             let Rendered { image, report, .. } = self.render(session, seed, aim)?;
             let relmse = self.two.error(&image);
-            are_pixels_apart &= report.photons.is_none();
+            are_pixels_independent &= report.photons.is_none();
             if !relmse.is_finite() {
                 let name = &self.method.name;
-                return Err(Trouble::Failed(Failure::Work(format!(
+                return Err(BenchError::Failed(Failure::Work(format!(
                     "{name}: the error of seed {seed} is not finite"
                 ))));
             }
-            pictures.push(Picture {
+            pictures.push(ImageResult {
                 seed,
                 samples: report.image.samples.mean,
                 seconds: rendering(&report),
@@ -108,8 +120,8 @@ impl Measure<'_> {
             });
             images.push(image);
         }
-        let brightness = brightness(self.two, &images, are_pixels_apart);
-        let step = Step { brightness, ..summary(aim, pictures, &images, self.two) };
+        let brightness = brightness(self.two, &images, are_pixels_independent);
+        let step = StepResult { brightness, ..summary(aim, pictures, &images, self.two) };
         let (name, seconds) = (&self.method.name, words::seconds(step.seconds));
         self.run.done(&format!(
             "{name}, {}: {seconds}, relMSE {}",
@@ -120,49 +132,56 @@ impl Measure<'_> {
         Ok(step)
     }
 
-    fn say_picture(&self, aim: Aim, number: u32, pace: &Pace, took: &[f64], pictures: &[Picture]) {
+    fn report_image(
+        &self,
+        aim: StepTarget,
+        number: u32,
+        budget: &TimeBudget,
+        took: &[f64],
+        pictures: &[ImageResult],
+    ) {
         let order = self.run.order;
         let amount = match aim.budget {
             Some(seconds) => words::seconds(seconds),
             None => samples(aim.samples.into()),
         };
         let what = format!("{}, {amount}, seed {} of {}", self.method.name, number + 1, order.seeds);
-        // Of one picture of this step, by those before it or by the step before.
+        // Estimate the time per image from the previous image or step.
         let each = match (pictures, took.last()) {
             ([.., last], _) => Some(last.seconds),
             ([], Some(step)) => Some(self.growth(aim) * step / f64::from(order.seeds)),
             ([], None) => None,
         };
-        let to_come = f64::from(order.seeds - number);
-        let left =
-            each.map(|each| pace.left(each * (to_come + f64::from(order.seeds) * self.later(aim)), false));
+        let remaining = f64::from(order.seeds - number);
+        let left = each
+            .map(|each| budget.left(each * (remaining + f64::from(order.seeds) * self.later(aim)), false));
         self.run.begins(&what, left);
     }
 
-    /// Factor of a step's time over the step before.
-    fn growth(&self, aim: Aim) -> f64 {
+    /// Expected ratio of a step's time to that of the previous step.
+    fn growth(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
-            Steps::Climb => f64::from(FACTOR),
-            Steps::Samples(list) => f64::from(list[index]) / f64::from(list[index - 1]),
-            Steps::Seconds(list) => list[index] / list[index - 1],
+            StepSchedule::Climb => f64::from(SAMPLE_RATIO),
+            StepSchedule::Samples(list) => f64::from(list[index]) / f64::from(list[index - 1]),
+            StepSchedule::Seconds(list) => list[index] / list[index - 1],
         }
     }
 
-    /// The steps after this one, in times of it.
-    fn later(&self, aim: Aim) -> f64 {
+    /// Expected total time of the later steps, relative to this one.
+    fn later(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {
-            Steps::Climb => 0.0,
-            Steps::Samples(list) => {
+            StepSchedule::Climb => 0.0,
+            StepSchedule::Samples(list) => {
                 let sum: f64 = list[index + 1..].iter().map(|samples| f64::from(*samples)).sum();
                 sum / f64::from(list[index])
             }
-            Steps::Seconds(list) => list[index + 1..].iter().sum::<f64>() / list[index],
+            StepSchedule::Seconds(list) => list[index + 1..].iter().sum::<f64>() / list[index],
         }
     }
 
-    fn render(&self, session: &mut Session, seed: u32, aim: Aim) -> Result<Rendered, Trouble> {
+    fn render(&self, session: &mut Session, seed: u32, aim: StepTarget) -> Result<Rendered, BenchError> {
         let Overrides { integrator, photons, shadows, clamp, accel, .. } = self.method.overrides.clone();
         let overrides = Overrides {
             integrator,
@@ -179,12 +198,17 @@ impl Measure<'_> {
     }
 }
 
-fn summary(aim: Aim, pictures: Vec<Picture>, images: &[RadianceImage], two: &TwoReferences) -> Step {
-    let of = |value: fn(&Picture) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
+fn summary(
+    aim: StepTarget,
+    pictures: Vec<ImageResult>,
+    images: &[RadianceImage],
+    two: &TwoReferences,
+) -> StepResult {
+    let of = |value: fn(&ImageResult) -> f64| pictures.iter().map(value).collect::<Vec<f64>>();
     let errors = of(|picture| picture.relmse);
     let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let most = errors.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    Step {
+    StepResult {
         samples: median(&of(|picture| picture.samples)),
         budget: aim.budget,
         seconds: median(&of(|picture| picture.seconds)),
@@ -197,12 +221,12 @@ fn summary(aim: Aim, pictures: Vec<Picture>, images: &[RadianceImage], two: &Two
     }
 }
 
-/// Seconds of what every picture takes: its photons and its rays.
+/// Seconds per image: photon mapping and rendering.
 fn rendering(report: &Report) -> f64 {
     [Stage::Photons, Stage::Render].map(|stage| report.stages[stage as usize].seconds).iter().sum()
 }
 
-/// Seconds of what is done once: all before.
+/// Seconds of the stages before, which run once.
 fn setup(report: &Report) -> f64 {
     report.stages[..Stage::Photons as usize].iter().map(|stage| stage.seconds).sum()
 }

@@ -1,72 +1,76 @@
-//! Methods that a scene is rendered by.
+//! Rendering methods to measure.
 
 use crate::choice::Choice;
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 
-/// The values of each toggle that are to be measured, all with all; empty: the scene's own.
+/// Values of each setting to measure, in all combinations. An empty list stands for the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toggles {
-    /// Rendering algorithms.
+    /// Integrators.
     pub integrators: Vec<Integrator>,
-    /// Photon maps, in whitted.
+    /// Photon mapping, in whitted.
     pub photons: Vec<bool>,
     /// Shadows, in whitted.
     pub shadows: Vec<Shadows>,
-    /// Most that one vertex of a path brings.
+    /// Limits of the radiance per bounce.
     pub clamps: Vec<f32>,
     /// Acceleration structures.
     pub accels: Vec<Accel>,
 }
 
-/// One way to render a scene.
+/// A rendering method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Method {
     /// Name in tables.
     pub name: String,
-    /// Overrides that make the method.
+    /// Overrides that select the method.
     pub overrides: Overrides,
 }
 
-/// Settings that a picture depends on, by the scene or the toggles.
+/// Settings of a method, used to remove duplicates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Way {
+struct MethodSettings {
     integrator: Integrator,
-    /// Photons and shadows; a path heeds neither.
+    /// Photons and shadows. `None` for path, which ignores both.
     of_whitted: Option<(bool, Shadows)>,
     clamp: f32,
     accel: Accel,
 }
 
-/// The methods of a scene. Without toggles: paths, whitted with photons, and the scene as it is if that is another method.
+/// The methods to measure on a scene. By default: path, whitted with photons, and the scene's own settings if they differ.
 pub fn methods(scene: &Scene, toggles: &Toggles) -> Vec<Method> {
-    let ways = if *toggles == Toggles::default() { usual(scene) } else { asked(scene, toggles) };
-    let mut distinct: Vec<Way> = Vec::new();
-    for way in ways {
-        if !distinct.contains(&way) {
-            distinct.push(way);
+    let all = if *toggles == Toggles::default() {
+        default_settings(scene)
+    } else {
+        requested_settings(scene, toggles)
+    };
+    let mut distinct: Vec<MethodSettings> = Vec::new();
+    for settings in all {
+        if !distinct.contains(&settings) {
+            distinct.push(settings);
         }
     }
-    distinct.into_iter().map(|way| method(way, toggles)).collect()
+    distinct.into_iter().map(|settings| method(settings, toggles)).collect()
 }
 
-fn usual(scene: &Scene) -> Vec<Way> {
+fn default_settings(scene: &Scene) -> Vec<MethodSettings> {
     let own = (scene.render.integrator, scene.photons.enabled);
     let ways = [(Integrator::Path, false), (Integrator::Whitted, true), own];
     let of = |(integrator, photons)| {
-        way(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
+        settings(integrator, photons, scene.render.shadows, scene.render.clamp, scene.render.accel)
     };
     ways.into_iter().map(of).collect()
 }
 
-fn asked(scene: &Scene, toggles: &Toggles) -> Vec<Way> {
+fn requested_settings(scene: &Scene, toggles: &Toggles) -> Vec<MethodSettings> {
     let mut ways = Vec::new();
     for integrator in or_own(&toggles.integrators, scene.render.integrator) {
         for photons in or_own(&toggles.photons, scene.photons.enabled) {
             for shadows in or_own(&toggles.shadows, scene.render.shadows) {
                 for clamp in or_own(&toggles.clamps, scene.render.clamp) {
                     for accel in or_own(&toggles.accels, scene.render.accel) {
-                        ways.push(way(integrator, photons, shadows, clamp, accel));
+                        ways.push(settings(integrator, photons, shadows, clamp, accel));
                     }
                 }
             }
@@ -79,16 +83,22 @@ fn or_own<T: Copy>(asked: &[T], own: T) -> Vec<T> {
     if asked.is_empty() { vec![own] } else { asked.to_vec() }
 }
 
-fn way(integrator: Integrator, photons: bool, shadows: Shadows, clamp: f32, accel: Accel) -> Way {
+fn settings(
+    integrator: Integrator,
+    photons: bool,
+    shadows: Shadows,
+    clamp: f32,
+    accel: Accel,
+) -> MethodSettings {
     let method = integrator.method();
     let of_whitted = (method.gathers && method.honors_shadows).then_some((photons, shadows));
-    Way { integrator, of_whitted, clamp, accel }
+    MethodSettings { integrator, of_whitted, clamp, accel }
 }
 
-/// A method; its name tells the toggles that have several values.
-fn method(way: Way, toggles: &Toggles) -> Method {
-    let mut words = vec![way.integrator.name().to_owned()];
-    if let Some((photons, shadows)) = way.of_whitted {
+/// Creates a method. Its name contains the settings that were requested.
+fn method(settings: MethodSettings, toggles: &Toggles) -> Method {
+    let mut words = vec![settings.integrator.name().to_owned()];
+    if let Some((photons, shadows)) = settings.of_whitted {
         if photons {
             words.push("photons".to_owned());
         }
@@ -97,17 +107,17 @@ fn method(way: Way, toggles: &Toggles) -> Method {
         }
     }
     if !toggles.clamps.is_empty() {
-        words.push(format!("clamp {}", way.clamp));
+        words.push(format!("clamp {}", settings.clamp));
     }
     if !toggles.accels.is_empty() {
-        words.push(way.accel.name().to_owned());
+        words.push(settings.accel.name().to_owned());
     }
     let overrides = Overrides {
-        integrator: Some(way.integrator),
-        photons: Some(way.of_whitted.is_some_and(|(photons, _)| photons)),
-        shadows: way.of_whitted.map(|(_, shadows)| shadows),
-        clamp: Some(way.clamp),
-        accel: Some(way.accel),
+        integrator: Some(settings.integrator),
+        photons: Some(settings.of_whitted.is_some_and(|(photons, _)| photons)),
+        shadows: settings.of_whitted.map(|(_, shadows)| shadows),
+        clamp: Some(settings.clamp),
+        accel: Some(settings.accel),
         ..Overrides::default()
     };
     Method { name: words.join(" "), overrides }
@@ -130,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn without_toggles_there_are_paths_photons_and_the_scene_as_it_is() {
+    fn default_methods_include_the_scene_settings() {
         let none = Toggles::default();
         assert_eq!(names("", &none), ["path", "whitted photons", "whitted"]);
         assert_eq!(names("[photons]\nenabled = true\n", &none), ["path", "whitted photons"]);
@@ -138,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn toggles_are_multiplied_and_what_is_the_same_is_rendered_once() {
+    fn all_distinct_combinations_are_measured() {
         let toggles = Toggles {
             integrators: vec![Integrator::Path, Integrator::Whitted],
             photons: vec![true, false],
@@ -162,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_method_says_all_that_makes_it() {
+    fn methods_override_scene_settings() {
         let toggles = Toggles { integrators: vec![Integrator::Whitted], ..Toggles::default() };
         let method = methods(&scene("[render]\nclamp = 3\n[photons]\nenabled = true\n"), &toggles).remove(0);
         let overrides = &method.overrides;

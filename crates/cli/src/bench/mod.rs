@@ -1,7 +1,7 @@
-//! Time against error: scenes × methods × sample counts × seeds, each picture measured against two references.
+//! Measures error against time for scenes × methods × sample counts × seeds, with two references per scene.
 //!
-//! [`run`] does an [`Order`] and gives [`Results`]; [`table`], [`csv`] and [`plot`] show them, [`baseline`] compares them with older
-//! ones. References are made once and kept in [`cache`].
+//! [`run`] executes a [`BenchRequest`] and returns [`Results`]. [`table`], [`csv`] and [`plot`] present them, and [`baseline`]
+//! compares them with an older run. References are stored in a [`cache`].
 
 pub mod baseline;
 mod bias;
@@ -10,20 +10,20 @@ pub mod cache;
 pub mod csv;
 mod measure;
 mod methods;
-mod order;
-mod pace;
 pub mod plot;
 mod reference;
+mod request;
 mod results;
 mod run;
 mod slope;
 mod statistics;
 pub mod table;
+mod time_budget;
 
-pub use bias::{Bias, LEAST_SEEDS};
+pub use bias::{Bias, MIN_SEEDS};
 pub use brightness::Brightness;
 pub use methods::{Method, Toggles, methods};
-pub use order::{News, Order, ReferenceOrder, Steps, Trouble, Unfinished};
-pub use results::{MethodResult, Picture, ReferenceResult, Results, SceneResult, Step, Verdict};
+pub use request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, Unfinished};
+pub use results::{ImageResult, MethodResult, ReferenceResult, Results, SceneResult, StepResult, Verdict};
 pub use run::{run, size};
 pub use slope::{Slope, TimeTo};

@@ -1,4 +1,4 @@
-//! The error against the seconds on log axes, as SVG: a panel for each scene, a line for each method.
+//! SVG plots of error over time with logarithmic axes: one panel per scene, one line per method.
 
 mod axes;
 mod panel;
@@ -8,17 +8,17 @@ use plotters::prelude::{IntoDrawingArea, SVGBackend, WHITE};
 use super::results::Results;
 use crate::output::signed;
 
-/// Names of every panel's axes, across and up.
+/// Labels of the x and y axes.
 pub const AXES: [&str; 2] = ["seconds of rendering", "relMSE"];
-/// Size of a panel, in pixels of the SVG.
+/// Size of a panel in SVG pixels.
 const PANEL: (u32, u32) = (640, 480);
-/// Panels side by side.
+/// Panels per row.
 const ACROSS: usize = 2;
 
-/// The text of the file.
+/// Draws the plots.
 ///
 /// # Errors
-/// What the library says.
+/// An error of the plotting library.
 pub fn svg(results: &Results) -> Result<String, String> {
     let across = results.scenes.len().clamp(1, ACROSS);
     let down = results.scenes.len().div_ceil(ACROSS).max(1);
@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_xml_with_every_scene_method_and_axis() {
+    fn plots_have_all_scenes_methods_and_axes() {
         let svg = svg(&results()).expect("a plot");
         let texts = texts(&svg);
         for word in [
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_and_errors_of_nothing_are_drawn_too() {
+    fn plots_accept_missing_and_negative_values() {
         let mut some = results();
         some.scenes[0].methods.clear();
         for step in &mut some.scenes[1].methods[0].steps {

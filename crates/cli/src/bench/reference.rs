@@ -1,9 +1,9 @@
-//! Two references of a scene: given, kept from before, or made.
+//! The two references of a scene: given as files, cached or rendered.
 
 use std::path::{Path, PathBuf};
 
-use super::cache::{self, Cost, Stored};
-use super::order::Trouble;
+use super::cache::{self, CachedReferences, ReferenceCost};
+use super::request::BenchError;
 use super::results::ReferenceResult;
 use crate::compare::{Pair, TwoReferences};
 use crate::control::CancelToken;
@@ -14,142 +14,149 @@ use crate::scene::description::Integrator;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Seeds of the two. No picture that is measured has them.
+/// Seeds of the references. Measured images never use them.
 pub(super) const SEEDS: [u32; 2] = [u32::MAX - 1, u32::MAX];
 
-/// More than there is time for.
-const NO_END: u32 = 1 << 24;
+/// Samples for rendering until the time limit.
+const UNLIMITED_SAMPLES: u32 = 1 << 24;
 
-/// Times the samples of the most that is measured.
-const MORE: u32 = 100;
-/// The samples that are measured however few the references have.
-const LEAST_MEASURED: f64 = 16.0;
+/// Ratio of the references' samples to the most measured samples.
+const REFERENCE_RATIO: u32 = 100;
+/// Least upper limit of the measured samples, even for references with few samples.
+const MIN_MEASURED: f64 = 16.0;
 
-/// The most samples that a ladder climbs to.
-const MOST_MEASURED: f64 = 65_536.0;
+/// Most samples measured by default.
+const MAX_MEASURED: f64 = 65_536.0;
 
-/// The most samples for which references of so many of them can stand; of files nobody knows how many they have.
+/// Most samples to measure with references of this quality. `None` for files, whose samples are unknown.
 pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
-    let most = of_references.map_or(MOST_MEASURED, |samples| samples / f64::from(MORE));
-    most.clamp(LEAST_MEASURED, MOST_MEASURED)
+    let most = of_references.map_or(MAX_MEASURED, |samples| samples / f64::from(REFERENCE_RATIO));
+    most.clamp(MIN_MEASURED, MAX_MEASURED)
 }
 
-/// Quality of the references.
+/// Requested quality of the references.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Amount {
+pub(super) struct ReferenceQuality {
     pub(super) samples: u32,
-    /// Seconds of both.
+    /// Time limit of both in seconds.
     pub(super) seconds: Option<f64>,
 }
 
-impl Amount {
-    /// The best quality that the time allows, but no better than the most samples need.
+impl ReferenceQuality {
+    /// The best quality possible in the given time, limited to what `most` measured samples need.
     pub(super) fn in_time(seconds: f64, most: Option<u32>) -> Self {
-        let samples = most.map_or(NO_END, |most| most.saturating_mul(MORE).min(NO_END));
+        let samples = most
+            .map_or(UNLIMITED_SAMPLES, |most| most.saturating_mul(REFERENCE_RATIO).min(UNLIMITED_SAMPLES));
         Self { samples, seconds: Some(seconds) }
     }
 
-    /// Whether what was made before is as good. What had half of the time is.
-    fn is_met(self, cost: Cost) -> bool {
+    /// Whether cached references are good enough. Half of the time is.
+    fn is_met(self, cost: ReferenceCost) -> bool {
         cost.samples >= f64::from(self.samples)
             || self.seconds.is_some_and(|seconds| cost.seconds >= 0.5 * seconds)
     }
 }
 
-/// The references of a scene, with remarks about them.
-pub(super) struct Reference {
+/// The references of a scene, with warnings.
+pub(super) struct SceneReferences {
     pub(super) two: TwoReferences,
     pub(super) result: ReferenceResult,
     pub(super) warnings: Vec<Diagnostic>,
-    /// Why they could not be kept.
-    pub(super) unkept: Option<String>,
+    /// Why they could not be cached.
+    pub(super) cache_error: Option<String>,
 }
 
-/// Keys of the two references.
+/// Fingerprints of the two references.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Keys([Key; 2]);
+pub(super) struct ReferenceKeys([Key; 2]);
 
-/// References that are not kept yet.
-pub(super) struct Made {
-    pub(super) keys: Keys,
-    stored: Stored,
+/// Rendered references that are not cached yet.
+pub(super) struct RenderedReferences {
+    pub(super) keys: ReferenceKeys,
+    stored: CachedReferences,
     warnings: Vec<Diagnostic>,
 }
 
-/// Reads both; they may be one file.
-pub(super) fn given(files: &[PathBuf; 2]) -> Result<Reference, Trouble> {
+/// Loads references from files.
+pub(super) fn given(files: &[PathBuf; 2]) -> Result<SceneReferences, BenchError> {
     let pair = Pair::load(&files[0], &files[1]).map_err(|errors| {
-        Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+        BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     })?;
     let mut names: Vec<String> = files.iter().map(|file| file.to_string_lossy().into_owned()).collect();
     names.dedup();
     let two = TwoReferences::new(pair);
     let noise = two.noise();
     let result = ReferenceResult { samples: None, noise, seconds: None, is_cached: false, files: names };
-    Ok(Reference { two, result, warnings: Vec::new(), unkept: None })
+    Ok(SceneReferences { two, result, warnings: Vec::new(), cache_error: None })
 }
 
-/// Maker of references.
-pub(super) struct Maker<'a> {
+/// Renders references or loads them from the cache.
+pub(super) struct ReferenceRenderer<'a> {
     pub(super) scene: &'a Path,
-    /// Overrides, with the size.
+    /// Overrides, including the size.
     pub(super) common: &'a Overrides,
     pub(super) token: &'a CancelToken,
     pub(super) cache: Option<&'a Path>,
-    /// Samples of the references, if the call sets them.
+    /// Samples of the references, if requested.
     pub(super) asked: Option<u32>,
 }
 
-impl Maker<'_> {
-    fn key(&self, keys: &Keys) -> Key {
+impl ReferenceRenderer<'_> {
+    fn key(&self, keys: &ReferenceKeys) -> Key {
         cache_key(BUILD, self.asked, keys)
     }
 
-    /// Pictures of one sample show what the references depend on, and that everything can be read.
-    pub(super) fn keys(&self, session: &mut Session) -> Result<Keys, Trouble> {
-        let [one, two] = SEEDS
-            .map(|seed| self.render(session, seed, Amount { samples: 1, seconds: None }).map(|it| it.key));
-        Ok(Keys([one?, two?]))
+    /// Renders one sample to get the fingerprints of the references, and to check that all files can be read.
+    pub(super) fn keys(&self, session: &mut Session) -> Result<ReferenceKeys, BenchError> {
+        let [one, two] = SEEDS.map(|seed| {
+            self.render(session, seed, ReferenceQuality { samples: 1, seconds: None }).map(|it| it.key)
+        });
+        Ok(ReferenceKeys([one?, two?]))
     }
 
-    /// The stored references, if they are good enough.
-    pub(super) fn kept(&self, keys: &Keys, amount: Amount) -> Option<Reference> {
+    /// Loads cached references, if they are good enough.
+    pub(super) fn kept(&self, keys: &ReferenceKeys, amount: ReferenceQuality) -> Option<SceneReferences> {
         let stored = cache::load(self.cache?, &self.key(keys)).filter(|stored| amount.is_met(stored.cost))?;
         Some(reference(stored, true, Vec::new(), None))
     }
 
-    /// Renders both; tells `begin` before each how many are left.
+    /// Renders both references. Calls `begin` before each with the number of references left.
     pub(super) fn make(
         &self,
         session: &mut Session,
-        amount: Amount,
+        amount: ReferenceQuality,
         mut begin: impl FnMut(usize),
-    ) -> Result<Made, Trouble> {
-        let half = Amount { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
+    ) -> Result<RenderedReferences, BenchError> {
+        let half = ReferenceQuality { seconds: amount.seconds.map(|seconds| seconds / 2.0), ..amount };
         begin(2);
         let first = self.render(session, SEEDS[0], half)?;
         begin(1);
         let second = self.render(session, SEEDS[1], half)?;
-        let cost = Cost {
+        let cost = ReferenceCost {
             samples: (first.report.image.samples.mean + second.report.image.samples.mean) / 2.0,
             seconds: first.report.seconds + second.report.seconds,
         };
         let names = ["the first reference", "the second reference"].map(Path::new);
         let pair = Pair::new(names, first.image, second.image).map_err(|errors| {
-            Trouble::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
+            BenchError::Call(errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
         })?;
-        let keys = Keys([first.key, second.key]);
-        Ok(Made { keys, stored: Stored { pair, cost }, warnings: first.warnings })
+        let keys = ReferenceKeys([first.key, second.key]);
+        Ok(RenderedReferences { keys, stored: CachedReferences { pair, cost }, warnings: first.warnings })
     }
 
-    /// Stores references for later runs, if there is a folder for them.
-    pub(super) fn keep(&self, made: Made) -> Reference {
-        let Made { keys, stored, warnings } = made;
-        let unkept = self.cache.and_then(|folder| cache::store(folder, &self.key(&keys), &stored).err());
-        reference(stored, false, warnings, unkept.map(|error| error.to_string()))
+    /// Stores rendered references in the cache, if it is enabled.
+    pub(super) fn keep(&self, made: RenderedReferences) -> SceneReferences {
+        let RenderedReferences { keys, stored, warnings } = made;
+        let cache_error = self.cache.and_then(|folder| cache::store(folder, &self.key(&keys), &stored).err());
+        reference(stored, false, warnings, cache_error.map(|error| error.to_string()))
     }
 
-    fn render(&self, session: &mut Session, seed: u32, amount: Amount) -> Result<Rendered, Trouble> {
+    fn render(
+        &self,
+        session: &mut Session,
+        seed: u32,
+        amount: ReferenceQuality,
+    ) -> Result<Rendered, BenchError> {
         let overrides = Overrides {
             integrator: Some(Integrator::Path),
             photons: Some(false),
@@ -163,9 +170,9 @@ impl Maker<'_> {
     }
 }
 
-/// Key of the references in the cache. Builds that may render other bits do not share references, and references with samples that
-/// the call sets differ from timed ones.
-fn cache_key(build: &str, asked: Option<u32>, Keys(keys): &Keys) -> Key {
+/// The cache key of the references. Builds do not share references, as their renders may differ. References with requested samples
+/// have different keys from those limited by time.
+fn cache_key(build: &str, asked: Option<u32>, ReferenceKeys(keys): &ReferenceKeys) -> Key {
     let mut key = Fingerprint::new("references");
     key.text(build).u64(asked.unwrap_or(0).into());
     keys.iter().for_each(|one| {
@@ -175,12 +182,12 @@ fn cache_key(build: &str, asked: Option<u32>, Keys(keys): &Keys) -> Key {
 }
 
 fn reference(
-    stored: Stored,
+    stored: CachedReferences,
     is_cached: bool,
     warnings: Vec<Diagnostic>,
-    unkept: Option<String>,
-) -> Reference {
-    let Stored { pair, cost } = stored;
+    cache_error: Option<String>,
+) -> SceneReferences {
+    let CachedReferences { pair, cost } = stored;
     let two = TwoReferences::new(pair);
     let result = ReferenceResult {
         samples: Some(cost.samples),
@@ -189,7 +196,7 @@ fn reference(
         is_cached,
         files: Vec::new(),
     };
-    Reference { two, result, warnings, unkept }
+    SceneReferences { two, result, warnings, cache_error }
 }
 
 #[cfg(test)]
@@ -198,9 +205,9 @@ mod tests {
 
     #[test]
     fn builds_share_no_references() {
-        let keys = || Keys(["a", "b"].map(|name| Fingerprint::new(name).finish()));
+        let keys = || ReferenceKeys(["a", "b"].map(|name| Fingerprint::new(name).finish()));
         let (common, token) = (Overrides::default(), CancelToken::new());
-        let maker = Maker {
+        let renderer = ReferenceRenderer {
             scene: Path::new("a.toml"),
             common: &common,
             token: &token,
@@ -208,16 +215,16 @@ mod tests {
             asked: Some(2),
         };
         let other = BUILD.replace("(build ", "(build 0");
-        assert_ne!(maker.key(&keys()), cache_key(&other, maker.asked, &keys()));
-        assert_ne!(maker.key(&keys()), cache_key(env!("CARGO_PKG_VERSION"), maker.asked, &keys()));
-        assert_eq!(maker.key(&keys()), cache_key(BUILD, maker.asked, &keys()));
+        assert_ne!(renderer.key(&keys()), cache_key(&other, renderer.asked, &keys()));
+        assert_ne!(renderer.key(&keys()), cache_key(env!("CARGO_PKG_VERSION"), renderer.asked, &keys()));
+        assert_eq!(renderer.key(&keys()), cache_key(BUILD, renderer.asked, &keys()));
     }
 
     #[test]
-    fn references_stand_for_a_hundredth_of_their_samples() {
+    fn steps_have_at_most_1_percent_of_samples() {
         assert_eq!(most_measured(Some(25_600.0)), 256.0);
-        assert_eq!(most_measured(Some(400.0)), 16.0, "less would show no slope");
+        assert_eq!(most_measured(Some(400.0)), 16.0, "fewer would show no slope");
         assert_eq!(most_measured(Some(1e9)), 65_536.0);
-        assert_eq!(most_measured(None), 65_536.0, "files do not tell theirs");
+        assert_eq!(most_measured(None), 65_536.0, "unknown samples");
     }
 }

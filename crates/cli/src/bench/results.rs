@@ -1,4 +1,4 @@
-//! Results: the JSON of `bench --json`, which is also a baseline.
+//! Results of a benchmark, as stored by `bench --json` and read by `--baseline`.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,138 +7,138 @@ use super::brightness::Brightness;
 use super::slope::{Slope, TimeTo, slope, time_to};
 use super::statistics::mean;
 
-/// Errors whose times are reported.
+/// Target errors for which times are reported.
 pub const TARGETS: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
-/// Everything that was measured.
+/// Results of a benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Results {
-    /// Version.
+    /// Version of glimt.
     pub glimt: String,
-    /// Threads that rendered.
+    /// Rendering threads.
     pub threads: usize,
-    /// Seconds of the whole benchmark.
+    /// Total time in seconds.
     pub seconds: f64,
-    /// In the order of the call.
+    /// The scenes in the order of the arguments.
     pub scenes: Vec<SceneResult>,
 }
 
-/// A scene.
+/// Results of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneResult {
-    /// The file as named by the caller.
+    /// The path as given by the caller.
     pub scene: String,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Reference of the pictures.
+    /// The references.
     pub reference: ReferenceResult,
-    /// In the order of the table.
+    /// The methods in table order.
     pub methods: Vec<MethodResult>,
 }
 
 /// The references of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReferenceResult {
-    /// Samples per pixel of each of the two; none of files.
+    /// Samples per pixel of each reference. `None` for files.
     pub samples: Option<f64>,
-    /// relMSE of one reference, by the difference of both; 0 if one file is both.
+    /// relMSE of one reference, estimated from the difference of both. 0 if they are the same file.
     pub noise: f64,
-    /// Seconds of rendering both, now or when they were stored.
+    /// Seconds of rendering both, possibly in an earlier run.
     pub seconds: Option<f64>,
-    /// Whether they were there from before.
+    /// Whether they were loaded from the cache.
     pub is_cached: bool,
-    /// Files of the references, if the call names them.
+    /// Files of the references, if given.
     pub files: Vec<String>,
 }
 
-/// A method on a scene.
+/// Results of a method on a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MethodResult {
     /// Its name in tables.
     pub name: String,
-    /// Reading files, building trees, gathering lights.
+    /// Seconds for reading files, building acceleration structures and preparing lights.
     pub setup_seconds: f64,
-    /// In the order of their times.
-    pub steps: Vec<Step>,
-    /// Slope of the error over the seconds, by all steps.
+    /// The steps in order of time.
+    pub steps: Vec<StepResult>,
+    /// Slope of error over time on log axes, from all steps.
     pub slope: Option<Slope>,
-    /// Slope of the error over the seconds, by the last two steps.
+    /// Slope of error over time on log axes, from the last two steps.
     pub last_slope: Option<Slope>,
-    /// When it reaches the relMSEs that the table asks for, in their order.
+    /// Times to reach [`TARGETS`].
     pub time_to: [Option<TimeTo>; TARGETS.len()],
-    /// Whether it ends at what the references show.
+    /// Whether the method is biased.
     pub verdict: Verdict,
 }
 
-/// All pictures of one number of samples, or of one time.
+/// Results of one number of samples or one time limit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Step {
-    /// Samples per pixel; the median where a time ended them.
+pub struct StepResult {
+    /// Samples per pixel. The median with a time limit.
     pub samples: f64,
-    /// The time that ended them.
+    /// The time limit in seconds.
     pub budget: Option<f64>,
-    /// Median of the seconds of sending photons and tracing.
+    /// Median of the seconds of photon mapping and rendering.
     pub seconds: f64,
     /// Median of relMSE.
     pub relmse: f64,
-    /// Least and greatest.
+    /// Minimum and maximum of relMSE.
     pub spread: [f64; 2],
-    /// The standard error that the noise of the references gives each.
+    /// Standard error of each relMSE due to the noise of the references.
     pub uncertainty: f64,
-    /// Error that the pictures share. `None` for too few pictures.
+    /// The estimated bias. `None` for too few images.
     pub bias: Option<Bias>,
-    /// Difference in brightness to the references. `None` for too few pictures.
+    /// Difference in brightness from the references. `None` for too few images.
     #[serde(default)]
     pub brightness: Option<Brightness>,
-    /// Each.
-    pub pictures: Vec<Picture>,
+    /// The individual images.
+    pub pictures: Vec<ImageResult>,
 }
 
-/// A picture.
+/// Measurement of one image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Picture {
-    /// Its seed.
+pub struct ImageResult {
+    /// The seed.
     pub seed: u32,
-    /// Samples per pixel, on average.
+    /// Average samples per pixel.
     pub samples: f64,
-    /// Seconds of sending photons and tracing.
+    /// Seconds of photon mapping and rendering.
     pub seconds: f64,
-    /// Its error; by chance below 0 if it is smaller than the references can resolve.
+    /// The error. May be negative if it is smaller than the noise of the references.
     pub relmse: f64,
 }
 
-/// Whether a method ends at what the references show.
+/// Whether a method is biased.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Verdict {
-    /// Too few seeds to tell.
+    /// Too few seeds to decide.
     Unknown,
     /// No bias was found.
     NoneFound {
-        /// One of this size, squared, would have been.
+        /// Upper confidence bound of the squared bias.
         bound: f64,
     },
-    /// There is a bias that more samples make smaller.
+    /// There is a bias that decreases with more samples.
     Falls {
-        /// Its square at the last step, as a part of relMSE.
+        /// Squared bias at the last step, as a contribution to relMSE.
         size: f64,
-        /// The part of the error that it is.
+        /// Fraction of the error due to the bias.
         share: f64,
     },
-    /// There is a bias that more samples leave as it is: the slope flattens.
+    /// There is a bias that does not decrease, so the slope flattens.
     Stays {
-        /// Its square at the last step, as a part of relMSE.
+        /// Squared bias at the last step, as a contribution to relMSE.
         size: f64,
-        /// The part of the error that it is.
+        /// Fraction of the error due to the bias.
         share: f64,
     },
 }
 
 impl Verdict {
-    /// Verdict from the biases of the steps; the error is the mean at the last step.
-    pub(super) fn of(steps: &[Step]) -> Self {
+    /// Decides from the biases of the last two steps.
+    pub(super) fn of(steps: &[StepResult]) -> Self {
         let Some(last) = steps.last() else { return Self::Unknown };
         let Some(bias) = last.bias else { return Self::Unknown };
         if !bias.is_found() {
@@ -155,20 +155,20 @@ impl Verdict {
     }
 }
 
-/// Whether the later bias is smaller, by more than chance.
+/// Whether a bias decreases significantly.
 fn falls(before: Bias, after: Bias) -> bool {
-    /// Least ratio of the bias after four times the samples for a bias that stays. The bias of photons falls to 0.4, one that
-    /// stays to 1.
-    const STAYS: f64 = 0.8;
+    /// Largest ratio of a decreasing bias after quadrupling the samples. The bias of photon mapping decreases to 0.4, a constant
+    /// bias to 1.
+    const MAX_RATIO: f64 = 0.8;
     let error = (before.error * before.error + after.error * after.error).sqrt();
-    after.size < STAYS * before.size && before.size - after.size > 2.0 * error
+    after.size < MAX_RATIO * before.size && before.size - after.size > 2.0 * error
 }
 
 impl MethodResult {
-    pub(super) fn new(name: String, setup_seconds: f64, steps: Vec<Step>) -> Self {
+    pub(super) fn new(name: String, setup_seconds: f64, steps: Vec<StepResult>) -> Self {
         let middle: Vec<(f64, f64)> = steps.iter().map(|step| (step.seconds, step.relmse)).collect();
         let verdict = Verdict::of(&steps);
-        // An error that a bias holds is not expected to fall.
+        // With a constant bias, do not extrapolate the error.
         let is_expected = |time: &TimeTo| time.is_measured || !matches!(verdict, Verdict::Stays { .. });
         Self {
             name,
@@ -182,10 +182,10 @@ impl MethodResult {
     }
 }
 
-/// The first picture of every step, the second, …
-fn series(steps: &[Step]) -> Vec<Vec<(f64, f64)>> {
+/// One series per seed: the first image of every step, the second, and so on.
+fn series(steps: &[StepResult]) -> Vec<Vec<(f64, f64)>> {
     let count = steps.iter().map(|step| step.pictures.len()).min().unwrap_or(0);
-    let point = |step: &Step, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);
+    let point = |step: &StepResult, index: usize| (step.pictures[index].seconds, step.pictures[index].relmse);
     (0..count).map(|index| steps.iter().map(|step| point(step, index)).collect()).collect()
 }
 
@@ -193,16 +193,16 @@ fn series(steps: &[Step]) -> Vec<Vec<(f64, f64)>> {
 pub(super) mod tests {
     use super::*;
 
-    /// A step of made-up numbers: three pictures around an error.
-    pub(crate) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> Step {
-        let of = |(number, factor): (u32, f64)| Picture {
+    /// A synthetic step with three images around an error.
+    pub(crate) fn step(samples: f64, seconds: f64, relmse: f64, bias: f64) -> StepResult {
+        let of = |(number, factor): (u32, f64)| ImageResult {
             seed: number,
             samples,
             seconds: seconds * factor,
             relmse: relmse * factor,
         };
         let by_chance = if bias > 0.0 { 1e-9 } else { 0.4 };
-        Step {
+        StepResult {
             samples,
             budget: None,
             seconds,
@@ -219,7 +219,7 @@ pub(super) mod tests {
         }
     }
 
-    /// A method whose error halves with the time, on a bias.
+    /// A synthetic method: noise inversely proportional to time, plus a bias.
     pub(crate) fn method(name: &str, noise: f64, bias: f64) -> MethodResult {
         let steps =
             [1.0, 4.0, 16.0, 64.0].map(|samples| step(samples, samples * 0.01, noise / samples + bias, bias));
@@ -250,9 +250,9 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_bias_that_stays_and_one_that_falls_are_told_apart() {
+    fn constant_and_decreasing_bias_are_distinguished() {
         let of = |sizes: &[f64]| {
-            let steps: Vec<Step> = (0..)
+            let steps: Vec<StepResult> = (0..)
                 .zip(sizes)
                 .map(|(n, size)| step(f64::from(1 << (2 * n)), 1.0, 0.01 + size, *size))
                 .collect();
@@ -260,8 +260,8 @@ pub(super) mod tests {
         };
         assert!(matches!(of(&[1e-3, 1e-3, 1e-3]), Verdict::Stays { .. }));
         assert!(matches!(of(&[1e-3, 4e-4, 1.6e-4]), Verdict::Falls { .. }));
-        assert!(matches!(of(&[1e-3, 9e-4]), Verdict::Stays { .. }), "by less than chance");
-        assert!(matches!(of(&[1e-3]), Verdict::Stays { .. }), "nothing says that it falls");
+        assert!(matches!(of(&[1e-3, 9e-4]), Verdict::Stays { .. }), "not significant");
+        assert!(matches!(of(&[1e-3]), Verdict::Stays { .. }), "a single step");
         assert!(matches!(of(&[0.0, 0.0]), Verdict::NoneFound { bound } if bound > 0.0));
         assert_eq!(of(&[]), Verdict::Unknown);
         let Verdict::Stays { size, share } = of(&[0.03]) else { panic!("it stays") };
@@ -269,7 +269,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn slopes_are_of_all_steps_and_of_the_last_two() {
+    fn slopes_use_all_steps_and_the_last_two() {
         let method = method("whitted", 0.02, 0.01);
         let (all, last) = (method.slope.expect("a slope"), method.last_slope.expect("a slope"));
         assert!(all.value < -0.15 && last.value > -0.1, "{all:?} {last:?}");
@@ -277,7 +277,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn results_survive_their_json() {
+    fn results_round_trip_through_json() {
         let text = serde_json::to_string(&results()).expect("JSON");
         assert_eq!(serde_json::from_str::<Results>(&text).expect("results"), results());
     }

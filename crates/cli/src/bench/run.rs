@@ -1,14 +1,16 @@
-//! Scene after scene, method after method, step after step, seed after seed.
+//! Runs a benchmark: all scenes, each with its references and methods.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use super::measure::Measure;
+use super::measure::MethodRun;
 use super::methods::methods;
-use super::order::{News, Order, ReferenceOrder, Steps, Trouble, Unfinished};
-use super::pace::Pace;
-use super::reference::{Amount, Keys, Maker, Reference, SEEDS, given, most_measured};
-use super::results::{Results, SceneResult, Step};
+use super::reference::{
+    ReferenceKeys, ReferenceQuality, ReferenceRenderer, SEEDS, SceneReferences, given, most_measured,
+};
+use super::request::{BenchError, BenchEvent, BenchRequest, ReferenceSource, StepSchedule, Unfinished};
+use super::results::{Results, SceneResult, StepResult};
+use super::time_budget::TimeBudget;
 use crate::control::CancelToken;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::session::Session;
@@ -17,51 +19,58 @@ use crate::pipeline::words;
 use crate::scene;
 use crate::scene::description::Scene;
 
-/// Pixels on the longer side by default.
+/// Default length of the longer side in pixels.
 const LONG_SIDE: u32 = 96;
 
-/// Measure what the order asks for. All scenes are looked at before the first of them is measured.
+/// Runs a benchmark. Checks all scenes before measuring the first one.
 ///
 /// # Errors
-/// A scene or the call is wrong, the work failed, or a cancel token stopped it; with the scenes that were done by then.
-pub fn run(order: &Order, token: &CancelToken, tell: &dyn Fn(News)) -> Result<Results, Box<Unfinished>> {
-    let mut pace = Pace::new(order.within, order.scenes.len());
+/// A scene or the arguments are invalid, the work failed, or it was cancelled. Contains the results of completed scenes.
+pub fn run(
+    order: &BenchRequest,
+    token: &CancelToken,
+    tell: &dyn Fn(BenchEvent),
+) -> Result<Results, Box<Unfinished>> {
+    let mut budget = TimeBudget::new(order.within, order.scenes.len());
     let mut results =
         Results { glimt: env!("CARGO_PKG_VERSION").to_owned(), threads: 0, seconds: 0.0, scenes: Vec::new() };
-    let runs: Vec<Run<'_>> = order.scenes.iter().map(|path| Run { order, path, token, tell }).collect();
+    let runs: Vec<SceneRun<'_>> =
+        order.scenes.iter().map(|path| SceneRun { order, path, token, tell }).collect();
     let mut measure = || {
         check_seeds(order)?;
         check_all(&runs)?;
         for run in &runs {
-            results.scenes.push(run.scene(&mut pace, &mut results.threads)?);
-            pace.end_scene();
+            results.scenes.push(run.measure(&mut budget, &mut results.threads)?);
+            budget.end_scene();
         }
         Ok(())
     };
     let measured = measure();
-    results.seconds = pace.seconds();
+    results.seconds = budget.seconds();
     match measured {
         Ok(()) => Ok(results),
-        Err(trouble) => Err(Box::new(Unfinished { trouble, done: results })),
+        Err(error) => Err(Box::new(Unfinished { error, done: results })),
     }
 }
 
-/// All that is wrong with any of the scenes.
-fn check_all(runs: &[Run<'_>]) -> Result<(), Trouble> {
+/// Checks all scenes and collects their errors.
+fn check_all(runs: &[SceneRun<'_>]) -> Result<(), BenchError> {
     let mut wrong = Vec::new();
     for run in runs {
-        match run.look(&mut Session::default()) {
+        match run.prepare(&mut Session::default()) {
             Ok(_) => {}
-            Err(Trouble::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
-            Err(trouble @ (Trouble::Failed(Failure::Work(_)) | Trouble::Call(_) | Trouble::Cancelled)) => {
-                return Err(trouble);
+            Err(BenchError::Failed(Failure::Scene(diagnostics))) => wrong.extend(diagnostics),
+            Err(
+                error @ (BenchError::Failed(Failure::Work(_)) | BenchError::Call(_) | BenchError::Cancelled),
+            ) => {
+                return Err(error);
             }
         }
     }
-    if wrong.is_empty() { Ok(()) } else { Err(Trouble::Failed(Failure::Scene(wrong))) }
+    if wrong.is_empty() { Ok(()) } else { Err(BenchError::Failed(Failure::Scene(wrong))) }
 }
 
-/// The size at which a scene is measured.
+/// The size of the images of a scene.
 pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
     let (width, height) = (f64::from(scene.render.width), f64::from(scene.render.height));
     let side = |length: f64| length.round().clamp(1.0, 65536.0) as u32;
@@ -76,51 +85,56 @@ pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
     }
 }
 
-/// Each picture has a seed of its own, and none that of a reference.
-fn check_seeds(order: &Order) -> Result<(), Trouble> {
-    /// Steps that a ladder has at most.
-    const MOST_STEPS: u32 = 64;
+/// Checks that the seeds of images and references do not overlap.
+fn check_seeds(order: &BenchRequest) -> Result<(), BenchError> {
+    /// Most steps of a default schedule.
+    const MAX_STEPS: u32 = 64;
     let steps = match &order.steps {
-        Steps::Climb => MOST_STEPS,
-        Steps::Samples(list) => list.len() as u32,
-        Steps::Seconds(list) => list.len() as u32,
+        StepSchedule::Climb => MAX_STEPS,
+        StepSchedule::Samples(list) => list.len() as u32,
+        StepSchedule::Seconds(list) => list.len() as u32,
     };
     let last = u64::from(order.seed) + u64::from(steps) * u64::from(order.seeds);
     if last < u64::from(SEEDS[0]) {
         return Ok(());
     }
-    let way_out = "the seeds of the pictures would reach those of the references; choose a smaller --seed";
-    Err(Trouble::Call(format!("--seed {} is too large: {way_out}", order.seed)))
+    let way_out = "the seeds would overlap with those of the references; choose a smaller --seed";
+    Err(BenchError::Call(format!("--seed {} is too large: {way_out}", order.seed)))
 }
 
-/// Inputs of a scene's measurement.
-pub(super) struct Run<'a> {
-    pub(super) order: &'a Order,
+/// A run of the benchmark on one scene.
+pub(super) struct SceneRun<'a> {
+    pub(super) order: &'a BenchRequest,
     pub(super) path: &'a Path,
     pub(super) token: &'a CancelToken,
-    tell: &'a dyn Fn(News),
+    tell: &'a dyn Fn(BenchEvent),
 }
 
-/// A scene that can be measured.
-struct Looked {
+/// Message about a scene that was saved while being measured.
+fn changed_during_measurement(scene: &Path) -> String {
+    format!("{} or one of its files changed during the measurement; run the benchmark again", scene.display())
+}
+
+/// A validated scene, ready to be measured.
+struct PreparedScene {
     scene: Arc<Scene>,
-    /// References that were given.
-    given: Option<Reference>,
-    /// The settings that all pictures share with the references.
+    /// References given as files.
+    given: Option<SceneReferences>,
+    /// Overrides shared by all images and the references.
     common: Overrides,
-    keys: Keys,
+    keys: ReferenceKeys,
 }
 
-impl Run<'_> {
-    /// Reads it and everything that it names.
-    fn look(&self, session: &mut Session) -> Result<Looked, Trouble> {
+impl SceneRun<'_> {
+    /// Reads and validates the scene and its files.
+    fn prepare(&self, session: &mut Session) -> Result<PreparedScene, BenchError> {
         let order = self.order;
         self.begins("reading", None);
         let loaded = scene::load(self.path, &order.common.sets)
-            .map_err(|diagnostics| Trouble::Failed(Failure::Scene(diagnostics)))?;
+            .map_err(|diagnostics| BenchError::Failed(Failure::Scene(diagnostics)))?;
         let given = match &order.reference {
-            ReferenceOrder::Files(files) => Some(given(files)?),
-            ReferenceOrder::InTime | ReferenceOrder::Samples(_) => None,
+            ReferenceSource::Files(files) => Some(given(files)?),
+            ReferenceSource::InTime | ReferenceSource::Samples(_) => None,
         };
         let (width, height) = match &given {
             Some(reference) => (reference.two.pair().a().width, reference.two.pair().a().height),
@@ -128,37 +142,43 @@ impl Run<'_> {
         };
         let common =
             Overrides { width: Some(width), height: Some(height), error: Some(0.0), ..order.common.clone() };
-        let keys = self.maker(&common).keys(session)?;
+        let keys = self.reference_renderer(&common).keys(session)?;
         self.check_targets(session)?;
-        Ok(Looked { scene: Arc::clone(&loaded.scene), given, common, keys })
+        Ok(PreparedScene { scene: Arc::clone(&loaded.scene), given, common, keys })
     }
 
-    pub(super) fn maker<'a>(&'a self, common: &'a Overrides) -> Maker<'a> {
+    pub(super) fn reference_renderer<'a>(&'a self, common: &'a Overrides) -> ReferenceRenderer<'a> {
         let asked = match &self.order.reference {
-            ReferenceOrder::Samples(samples) => Some(*samples),
-            ReferenceOrder::InTime | ReferenceOrder::Files(_) => None,
+            ReferenceSource::Samples(samples) => Some(*samples),
+            ReferenceSource::InTime | ReferenceSource::Files(_) => None,
         };
-        Maker { scene: self.path, common, token: self.token, cache: self.order.cache.as_deref(), asked }
+        ReferenceRenderer {
+            scene: self.path,
+            common,
+            token: self.token,
+            cache: self.order.cache.as_deref(),
+            asked,
+        }
     }
 
-    /// Looks again: a person may have saved the scene since.
-    fn scene(&self, pace: &mut Pace, threads: &mut usize) -> Result<SceneResult, Trouble> {
+    /// Measures the scene. Prepares it again, as it may have been saved since the first check.
+    fn measure(&self, budget: &mut TimeBudget, threads: &mut usize) -> Result<SceneResult, BenchError> {
         let mut session = Session::default();
-        let Looked { scene, given, common, keys } = self.look(&mut session)?;
+        let PreparedScene { scene, given, common, keys } = self.prepare(&mut session)?;
         let methods = methods(&scene, &self.order.toggles);
-        pace.begin_scene(methods.len());
+        budget.begin_scene(methods.len());
         let reference = match given {
             Some(reference) => reference,
-            None => self.reference(&mut session, &common, &keys, pace)?,
+            None => self.reference(&mut session, &common, &keys, budget)?,
         };
         drop(session);
         let (width, height) = (reference.two.pair().a().width, reference.two.pair().a().height);
-        self.say_reference(&reference, (width, height));
+        self.report_references(&reference, (width, height));
         let most_samples = most_measured(reference.result.samples);
         let mut measured = Vec::new();
         for method in &methods {
-            pace.begin_method();
-            let method = Measure {
+            budget.begin_method();
+            let method = MethodRun {
                 run: self,
                 common: &common,
                 method,
@@ -166,52 +186,49 @@ impl Run<'_> {
                 two: &reference.two,
                 most_samples,
             };
-            measured.push(method.measure(pace, threads)?);
-            pace.end_method();
+            measured.push(method.measure(budget, threads)?);
+            budget.end_method();
         }
         let scene = self.path.to_string_lossy().into_owned();
         Ok(SceneResult { scene, width, height, reference: reference.result, methods: measured })
     }
 
-    /// The references that are kept, if they are good enough, or new ones.
+    /// Loads cached references if they are good enough, or renders new ones.
     fn reference(
         &self,
         session: &mut Session,
         common: &Overrides,
-        keys: &Keys,
-        pace: &Pace,
-    ) -> Result<Reference, Trouble> {
+        keys: &ReferenceKeys,
+        budget: &TimeBudget,
+    ) -> Result<SceneReferences, BenchError> {
         let amount = match &self.order.reference {
-            ReferenceOrder::Samples(samples) => Amount { samples: *samples, seconds: None },
-            ReferenceOrder::InTime | ReferenceOrder::Files(_) => {
-                Amount::in_time(pace.of_references(), self.order.steps.most_samples())
+            ReferenceSource::Samples(samples) => ReferenceQuality { samples: *samples, seconds: None },
+            ReferenceSource::InTime | ReferenceSource::Files(_) => {
+                ReferenceQuality::in_time(budget.reference_seconds(), self.order.steps.most_samples())
             }
         };
-        let maker = self.maker(common);
+        let maker = self.reference_renderer(common);
         if let Some(kept) = maker.kept(keys, amount) {
             return Ok(kept);
         }
         let begin = |left: usize| {
-            let seconds = amount.seconds.map(|seconds| pace.left(seconds * left as f64 / 2.0, true));
+            let seconds = amount.seconds.map(|seconds| budget.left(seconds * left as f64 / 2.0, true));
             self.begins(&format!("reference {} of 2", 3 - left), seconds);
         };
         let made = maker.make(session, amount, begin)?;
         if made.keys == *keys { Ok(maker.keep(made)) } else { Err(self.changed()) }
     }
 
-    /// A person saved the scene, or a file that it names: its figures would be of two scenes.
-    pub(super) fn changed(&self) -> Trouble {
-        let scene = self.path.display();
-        Trouble::Failed(Failure::Work(format!(
-            "{scene} or a file that it names changed while it was measured; leave them as they are and measure again"
-        )))
+    /// The error about a scene that was saved while being measured.
+    pub(super) fn changed(&self) -> BenchError {
+        BenchError::Failed(Failure::Work(changed_during_measurement(self.path)))
     }
 
-    /// No output may be a file that the scene is made of.
-    fn check_targets(&self, session: &Session) -> Result<(), Trouble> {
+    /// Checks that no output is an input of the scene.
+    fn check_targets(&self, session: &Session) -> Result<(), BenchError> {
         match self.order.targets.iter().find(|target| session.reads(target)) {
-            Some(target) => Err(Trouble::Call(format!(
-                "cannot write {}: it is a file that {} is made of; name another file",
+            Some(target) => Err(BenchError::Call(format!(
+                "cannot write {}: {} depends on it; choose another file",
                 target.display(),
                 self.path.display()
             ))),
@@ -219,17 +236,17 @@ impl Run<'_> {
         }
     }
 
-    fn say_reference(&self, reference: &Reference, (width, height): (u32, u32)) {
+    fn report_references(&self, reference: &SceneReferences, (width, height): (u32, u32)) {
         if !reference.warnings.is_empty() {
-            (self.tell)(News::Warnings(reference.warnings.clone()));
+            (self.tell)(BenchEvent::Warnings(reference.warnings.clone()));
         }
-        if let Some(why) = &reference.unkept {
-            self.done(&format!("the references are not kept: {why}"));
+        if let Some(why) = &reference.cache_error {
+            self.done(&format!("the references are not cached: {why}"));
         }
         let result = &reference.result;
         let made = match (result.is_cached, result.seconds) {
-            (true, _) => "kept from before".to_owned(),
-            (false, Some(seconds)) => format!("in {}", words::seconds(seconds)),
+            (true, _) => "from the cache".to_owned(),
+            (false, Some(seconds)) => format!("rendered in {}", words::seconds(seconds)),
             (false, None) => "from files".to_owned(),
         };
         self.done(&format!("references of {width}×{height} pixels {made}, relMSE {:.1e} each", result.noise));
@@ -237,21 +254,21 @@ impl Run<'_> {
 
     pub(super) fn begins(&self, what: &str, left: Option<f64>) {
         let what = format!("{}: {what}", self.path.display());
-        (self.tell)(News::Begins { what, left });
+        (self.tell)(BenchEvent::Begins { what, left });
     }
 
-    pub(super) fn point(&self, method: &str, step: &Step) {
+    pub(super) fn point(&self, method: &str, step: &StepResult) {
         let (scene, method) = (self.path.to_string_lossy().into_owned(), method.to_owned());
-        (self.tell)(News::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
+        (self.tell)(BenchEvent::Point { scene, method, seconds: step.seconds, relmse: step.relmse });
     }
 
     pub(super) fn done(&self, what: &str) {
-        (self.tell)(News::Done(format!("{}: {what}", self.path.display())));
+        (self.tell)(BenchEvent::Done(format!("{}: {what}", self.path.display())));
     }
 }
 
-impl Steps {
-    /// The most samples, if known.
+impl StepSchedule {
+    /// The largest number of samples, if known.
     fn most_samples(&self) -> Option<u32> {
         match self {
             Self::Samples(list) => list.iter().max().copied(),
@@ -265,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_have_the_aspect_of_the_scene() {
+    fn images_keep_the_aspect_ratio() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell.toml");
         let of = |width, height, asked| {
             let mut scene = Scene::clone(&scene::load(Path::new(file), &[]).expect("a scene").scene);
@@ -274,7 +291,7 @@ mod tests {
         };
         assert_eq!(of(640, 480, (None, None)), (96, 72));
         assert_eq!(of(480, 640, (None, None)), (72, 96));
-        assert_eq!(of(64, 32, (None, None)), (64, 32), "none is larger than its scene");
+        assert_eq!(of(64, 32, (None, None)), (64, 32), "never larger than the scene");
         assert_eq!(of(65536, 1, (None, None)), (96, 1));
         assert_eq!(of(640, 480, (Some(40), None)), (40, 30));
         assert_eq!(of(640, 480, (None, Some(30))), (40, 30));
@@ -282,40 +299,40 @@ mod tests {
     }
 
     #[test]
-    fn scenes_that_were_done_are_given_back_though_a_later_one_fails() {
+    fn errors_keep_the_results_of_earlier_scenes() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
-        // Somebody moves the second one away while the first is measured.
+        // Remove the second scene while the first is measured.
         let tell = |news| match news {
-            News::Point { .. } => std::fs::remove_file(&order.scenes[1]).unwrap_or_default(),
-            News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+            BenchEvent::Point { .. } => std::fs::remove_file(&order.scenes[1]).unwrap_or_default(),
+            BenchEvent::Begins { .. } | BenchEvent::Done(_) | BenchEvent::Warnings(_) => {}
         };
         let Err(unfinished) = run(&order, &CancelToken::new(), &tell) else { panic!("it is gone") };
-        assert!(matches!(unfinished.trouble, Trouble::Failed(_)), "{:?}", unfinished.trouble);
+        assert!(matches!(unfinished.error, BenchError::Failed(_)), "{:?}", unfinished.error);
         let done: Vec<_> = unfinished.done.scenes.iter().map(|scene| scene.methods.len()).collect();
         assert_eq!(done, [3]);
     }
 
-    /// Two scenes in a folder, and an order that measures them quickly and keeps references there.
-    fn two_scenes(folder: &Path) -> Order {
+    /// Two scenes in a folder, and a request that measures them quickly with a cache in the same folder.
+    fn two_scenes(folder: &Path) -> BenchRequest {
         let scenes = ["a.toml", "b.toml"].map(|name| folder.join(name));
-        // References of equal scenes would be made once.
+        // Different colors, as equal scenes would share their references.
         scenes.iter().zip(["1", "2"]).for_each(|(scene, color)| write(scene, color));
-        Order {
+        BenchRequest {
             scenes: scenes.into(),
             width: Some(4),
             height: Some(4),
-            steps: Steps::Samples(vec![1]),
+            steps: StepSchedule::Samples(vec![1]),
             seeds: 2,
             seed: 1,
-            reference: ReferenceOrder::Samples(2),
+            reference: ReferenceSource::Samples(2),
             within: 10.0,
             cache: Some(folder.join("cache")),
-            ..Order::default()
+            ..BenchRequest::default()
         }
     }
 
-    /// A sky of one color.
+    /// Writes a scene with a constant environment.
     fn write(scene: &Path, color: &str) {
         let text =
             format!("[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n[environment]\ncolor = {color}\n");
@@ -323,18 +340,21 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_is_saved_before_its_turn_is_measured_as_it_is_then() {
+    fn scenes_saved_before_their_turn_are_read_again() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
         let save = |news| match news {
-            News::Point { scene, .. } if scene.ends_with("a.toml") => write(&order.scenes[1], "3"),
-            News::Point { .. } | News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+            BenchEvent::Point { scene, .. } if scene.ends_with("a.toml") => write(&order.scenes[1], "3"),
+            BenchEvent::Point { .. }
+            | BenchEvent::Begins { .. }
+            | BenchEvent::Done(_)
+            | BenchEvent::Warnings(_) => {}
         };
         let measured = run(&order, &CancelToken::new(), &save).expect("both");
         for method in measured.scenes.iter().flat_map(|scene| &scene.methods) {
-            assert_eq!(method.steps[0].relmse, 0.0, "{}: the sky of another file", method.name);
+            assert_eq!(method.steps[0].relmse, 0.0, "{}: the other version", method.name);
         }
-        // What is kept belongs to the file as it was read: as it was at first, it has no references.
+        // Cached references belong to the second version. The first version has none.
         let again = |color| {
             write(&order.scenes[1], color);
             let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
@@ -345,23 +365,26 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_that_is_saved_while_it_is_measured_gives_no_figures() {
+    fn scenes_saved_during_measurement_fail() {
         for moment in ["reference 2 of 2", "path, 1 sample, seed 2 of 2"] {
             let folder = tempfile::tempdir().expect("a folder");
             let order = two_scenes(folder.path());
             let save = |news| match news {
-                News::Begins { what, .. } if what.ends_with(&format!("b.toml: {moment}")) => {
+                BenchEvent::Begins { what, .. } if what.ends_with(&format!("b.toml: {moment}")) => {
                     write(&order.scenes[1], "3");
                 }
-                News::Point { .. } | News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+                BenchEvent::Point { .. }
+                | BenchEvent::Begins { .. }
+                | BenchEvent::Done(_)
+                | BenchEvent::Warnings(_) => {}
             };
             let Err(unfinished) = run(&order, &CancelToken::new(), &save) else {
                 panic!("saved at {moment}")
             };
-            let Trouble::Failed(Failure::Work(message)) = &unfinished.trouble else { panic!("{moment}") };
-            assert!(message.contains("b.toml or a file that it names changed"), "{message}");
+            let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("{moment}") };
+            assert_eq!(*message, changed_during_measurement(&order.scenes[1]));
             assert_eq!(unfinished.done.scenes.len(), 1);
-            // References of two skies are not kept.
+            // References of two versions are not cached.
             write(&order.scenes[1], "3");
             let again = run(&order, &CancelToken::new(), &|_| {}).expect("both");
             assert!(!again.scenes[1].reference.is_cached, "{moment}");
@@ -370,28 +393,33 @@ mod tests {
     }
 
     #[test]
-    fn a_save_that_the_references_do_not_heed_is_one_too() {
+    fn saves_that_spare_the_references_also_fail() {
         let folder = tempfile::tempdir().expect("a folder");
         let order = two_scenes(folder.path());
         let text =
             std::fs::read_to_string(&order.scenes[0]).expect("text") + "[render]\nambient = [1, 1, 1]\n";
         let save = |news| match news {
-            News::Begins { what, .. } if what.ends_with("a.toml: whitted, 1 sample, seed 2 of 2") => {
+            BenchEvent::Begins { what, .. } if what.ends_with("a.toml: whitted, 1 sample, seed 2 of 2") => {
                 std::fs::write(&order.scenes[0], &text).expect("written");
             }
-            News::Point { .. } | News::Begins { .. } | News::Done(_) | News::Warnings(_) => {}
+            BenchEvent::Point { .. }
+            | BenchEvent::Begins { .. }
+            | BenchEvent::Done(_)
+            | BenchEvent::Warnings(_) => {}
         };
         let Err(unfinished) = run(&order, &CancelToken::new(), &save) else { panic!("it was saved") };
-        let Trouble::Failed(Failure::Work(message)) = &unfinished.trouble else { panic!("of the work") };
-        assert!(message.contains("a.toml or a file that it names changed"), "{message}");
+        let BenchError::Failed(Failure::Work(message)) = &unfinished.error else { panic!("of the work") };
+        assert_eq!(*message, changed_during_measurement(&order.scenes[0]));
     }
 
     #[test]
-    fn no_picture_has_the_seed_of_a_reference() {
-        let order = |seed| Order { seed, seeds: 6, ..Order::default() };
+    fn seeds_never_overlap_with_references() {
+        let order = |seed| BenchRequest { seed, seeds: 6, ..BenchRequest::default() };
         assert!(check_seeds(&order(1)).is_ok());
         assert!(check_seeds(&order(u32::MAX - 6 * 64 - 2)).is_ok());
-        let Err(Trouble::Call(message)) = check_seeds(&order(u32::MAX - 6 * 64)) else { panic!("refused") };
-        assert!(message.contains("choose a smaller --seed"), "{message}");
+        let Err(BenchError::Call(message)) = check_seeds(&order(u32::MAX - 6 * 64)) else {
+            panic!("refused")
+        };
+        assert!(message.contains("--seed"), "{message}");
     }
 }

@@ -1,28 +1,28 @@
-//! Convergence of an error: the slope of its logarithm over that of the time.
+//! Convergence: the slope of error over time on log–log axes.
 
 use serde::{Deserialize, Serialize};
 
 use super::statistics::mean;
 
-/// A slope on log axes: −1 is what random samples do, 0 is an error that more time does not make less.
+/// A slope on log–log axes. It is −1 for independent samples, and 0 if the error does not decrease.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Slope {
     /// The slope.
     pub value: f64,
-    /// Its standard error, from series to series.
+    /// Standard error over the series.
     pub error: f64,
 }
 
-/// The mean slope of some series of times and errors that are independent of each other. Errors that are not above 0 have no
-/// logarithm and are left out; none, where no series has two points at different times.
+/// The mean slope of independent series of times and errors. Skips errors that are not positive. `None` if no series has two
+/// points at different times.
 pub fn slope(series: &[Vec<(f64, f64)>]) -> Option<Slope> {
-    let slopes: Vec<f64> = series.iter().filter_map(|points| of_one(points)).collect();
+    let slopes: Vec<f64> = series.iter().filter_map(|points| fit(points)).collect();
     let (value, error) = mean(&slopes);
     (!slopes.is_empty()).then_some(Slope { value, error: if error.is_finite() { error } else { 0.0 } })
 }
 
-/// Least squares.
-fn of_one(points: &[(f64, f64)]) -> Option<f64> {
+/// Least-squares slope of one series.
+fn fit(points: &[(f64, f64)]) -> Option<f64> {
     let usable = points.iter().filter(|(time, error)| *time > 0.0 && *error > 0.0);
     let logs: Vec<(f64, f64)> = usable.map(|&(time, error)| (libm::log(time), libm::log(error))).collect();
     let count = logs.len() as f64;
@@ -35,9 +35,8 @@ fn of_one(points: &[(f64, f64)]) -> Option<f64> {
     (square > 1e-12).then(|| product / square)
 }
 
-/// When an error falls to `target`: on the straight line between the two points around it on log axes; beyond the last point, on
-/// the line of the last two. None where it was below it at once, does not fall, or would take more than a thousand times as long
-/// as was measured.
+/// When the error reaches `target`, by linear interpolation on log–log axes, or extrapolation of the last two points. `None` if the
+/// first error is already below, the error does not decrease, or the time exceeds a thousand times the measured one.
 pub fn time_to(target: f64, points: &[(f64, f64)]) -> Option<TimeTo> {
     let after = points.iter().position(|(_, error)| *error <= target);
     let (index, is_measured) = match after {
@@ -55,12 +54,12 @@ pub fn time_to(target: f64, points: &[(f64, f64)]) -> Option<TimeTo> {
     (seconds <= 1000.0 * t1).then_some(TimeTo { seconds, is_measured })
 }
 
-/// When an error falls to a target.
+/// When an error reaches a target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeTo {
-    /// After so many seconds of rendering.
+    /// Seconds of rendering.
     pub seconds: f64,
-    /// Whether what was measured goes so far.
+    /// Whether the time is interpolated, not extrapolated.
     pub is_measured: bool,
 }
 
@@ -74,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_of_straight_lines_are_found() {
+    fn slopes_of_power_laws_are_exact() {
         for value in [-1.0, -2.0 / 3.0, 0.0] {
             let found = slope(&[points(value, 0.0), points(value, 0.0)]).expect("a slope");
             assert!((found.value - value).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
@@ -84,14 +83,14 @@ mod tests {
     }
 
     #[test]
-    fn a_floor_makes_the_last_slope_flat() {
+    fn constant_bias_flattens_the_last_slope() {
         let flat = points(-1.0, 0.05);
         let last = slope(&[flat[3..].to_vec()]).expect("a slope");
         assert!(last.value > -0.05, "{last:?}");
     }
 
     #[test]
-    fn what_has_no_logarithm_is_left_out() {
+    fn nonpositive_errors_are_skipped() {
         let mut some = points(-1.0, 0.0);
         some[4].1 = -1e-9;
         assert!((slope(&[some]).expect("a slope").value + 1.0).abs() < 1e-12);
@@ -100,15 +99,15 @@ mod tests {
     }
 
     #[test]
-    fn the_time_to_an_error_is_measured_or_expected() {
+    fn times_are_interpolated_or_extrapolated() {
         let fall = points(-1.0, 0.0);
         let inside = time_to(0.01, &fall).expect("a time");
         assert!(inside.is_measured && (inside.seconds - 0.1).abs() < 1e-9, "{inside:?}");
         let beyond = time_to(1e-4, &fall).expect("a time");
         assert!(!beyond.is_measured && (beyond.seconds - 10.0).abs() < 1e-6, "{beyond:?}");
         assert_eq!(time_to(1e-9, &fall), None, "too far");
-        assert_eq!(time_to(0.5, &fall), None, "from the start");
-        assert_eq!(time_to(0.001, &points(0.0, 0.0)), None, "it does not fall");
+        assert_eq!(time_to(0.5, &fall), None, "reached at once");
+        assert_eq!(time_to(0.001, &points(0.0, 0.0)), None, "it does not decrease");
         assert_eq!(time_to(0.1, &[(1.0, 1.0)]), None);
     }
 }

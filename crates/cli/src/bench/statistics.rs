@@ -1,6 +1,6 @@
-//! Medians, and how sure a difference is: Student's t.
+//! Medians, means and Student's t distribution.
 
-/// The middle of some numbers; of an even number of them, the mean of the two in the middle. NaN of none.
+/// The median, or NaN for an empty slice.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -12,7 +12,7 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// The mean of some numbers, and its standard error; that of one number is infinite.
+/// The mean and its standard error, which is infinite for a single value.
 pub fn mean(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -21,27 +21,27 @@ pub fn mean(values: &[f64]) -> (f64, f64) {
     (mean, error)
 }
 
-/// The probability that Student's t with so many degrees of freedom is above `t`.
-pub fn above(t: f64, freedom: f64) -> f64 {
+/// The probability that Student's t with `freedom` degrees of freedom exceeds `t`.
+pub fn upper_tail(t: f64, freedom: f64) -> f64 {
     let x = freedom / (freedom + t * t);
     let tail = if t.is_infinite() { 0.0 } else { 0.5 * incomplete_beta(x, freedom / 2.0, 0.5) };
     if t >= 0.0 { tail } else { 1.0 - tail }
 }
 
-/// The t that [`above`] gives this probability for, one below a half.
+/// The inverse of [`upper_tail`], for probabilities below 0.5.
 pub fn quantile(probability: f64, freedom: f64) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
-    while above(high, freedom) > probability && high < 1e12 {
+    while upper_tail(high, freedom) > probability && high < 1e12 {
         high *= 2.0;
     }
     for _ in 0..100 {
         let middle = (low + high) / 2.0;
-        if above(middle, freedom) > probability { low = middle } else { high = middle }
+        if upper_tail(middle, freedom) > probability { low = middle } else { high = middle }
     }
     high
 }
 
-/// The difference of two means, b − a, with its standard error and its degrees of freedom by Welch and Satterthwaite.
+/// The difference of the means, b − a, with its standard error and degrees of freedom (Welch–Satterthwaite).
 pub fn welch(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     let ((mean_a, error_a), (mean_b, error_b)) = (mean(a), mean(b));
     let (square_a, square_b) = (error_a * error_a, error_b * error_b);
@@ -51,7 +51,7 @@ pub fn welch(a: &[f64], b: &[f64]) -> (f64, f64, f64) {
     (mean_b - mean_a, square.sqrt(), if freedom.is_finite() { freedom } else { 1.0 })
 }
 
-/// I_x(a, b), by its continued fraction (modified Lentz).
+/// The regularized incomplete beta function I_x(a, b), by its continued fraction (modified Lentz's method).
 fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x <= 0.0 || x >= 1.0 {
         return x.clamp(0.0, 1.0);
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn medians_and_means() {
+    fn medians_and_means_are_correct() {
         assert_eq!((median(&[3.0, 1.0, 2.0]), median(&[4.0, 1.0, 2.0, 3.0])), (2.0, 2.5));
         assert!(median(&[]).is_nan());
         let (value, error) = mean(&[1.0, 2.0, 3.0, 4.0]);
@@ -93,25 +93,29 @@ mod tests {
         assert_eq!(mean(&[1.0]), (1.0, f64::INFINITY));
     }
 
-    /// Tables of Student's t: one-sided.
+    /// Compares with tables of one-sided quantiles.
     #[test]
-    fn student_is_as_in_tables() {
+    fn student_t_matches_tables() {
         for (freedom, probability, t) in [
             (1.0, 0.05, 6.313_752),
             (5.0, 0.001, 5.893_430),
             (10.0, 0.025, 2.228_139),
             (100.0, 0.01, 2.364_217),
         ] {
-            assert!((above(t, freedom) / probability - 1.0).abs() < 1e-5, "{freedom}: {}", above(t, freedom));
+            assert!(
+                (upper_tail(t, freedom) / probability - 1.0).abs() < 1e-5,
+                "{freedom}: {}",
+                upper_tail(t, freedom)
+            );
             assert!((quantile(probability, freedom) - t).abs() < 1e-4, "{}", quantile(probability, freedom));
         }
-        assert!((above(-1.0, 3.0) + above(1.0, 3.0) - 1.0).abs() < 1e-14);
-        assert!((above(0.0, 7.0) - 0.5).abs() < 1e-14);
-        assert_eq!(above(f64::INFINITY, 7.0), 0.0);
+        assert!((upper_tail(-1.0, 3.0) + upper_tail(1.0, 3.0) - 1.0).abs() < 1e-14);
+        assert!((upper_tail(0.0, 7.0) - 0.5).abs() < 1e-14);
+        assert_eq!(upper_tail(f64::INFINITY, 7.0), 0.0);
     }
 
     #[test]
-    fn welch_is_as_computed_by_hand() {
+    fn welch_matches_a_manual_computation() {
         let (difference, error, freedom) = welch(&[1.0, 2.0, 3.0], &[5.0, 7.0, 9.0, 11.0]);
         assert!((difference - 6.0).abs() < 1e-14);
         // Variances 1 and 20/3: 1/3 + 5/3 = 2; 4/((1/9)/2 + (25/9)/3).

@@ -1,14 +1,15 @@
-//! The results in words and columns, for terminals of 80 columns.
+//! Formats results as a table of 80 columns.
 
-use super::results::{MethodResult, ReferenceResult, Results, SceneResult, Step, TARGETS, Verdict};
+use super::results::{MethodResult, ReferenceResult, Results, SceneResult, StepResult, TARGETS, Verdict};
 use super::slope::{Slope, TimeTo};
 use crate::pipeline::words;
 
-/// The lines.
+/// Formats the results as lines.
 pub fn table(results: &Results) -> Vec<String> {
     let mut lines: Vec<String> = results.scenes.iter().flat_map(of_scene).collect();
-    lines.push("seconds and relMSE: medians over the seeds; least, greatest: of relMSE; their".to_owned());
-    lines.push("product stays the same where random samples make the error.".to_owned());
+    lines
+        .push("Times and relMSE are medians over seeds; \"least\" and \"greatest\" are the range".to_owned());
+    lines.push("of relMSE. time × relMSE is constant for an unbiased method.".to_owned());
     lines
 }
 
@@ -46,18 +47,18 @@ fn references(reference: &ReferenceResult, scene: &SceneResult) -> String {
     let noise = format!("noise {}", error(reference.noise));
     let Some(samples) = reference.samples else {
         return match reference.files.as_slice() {
-            [one] => format!("reference: {one}, alone: its own noise is read as error"),
+            [one] => format!("reference: {one} (a single one, so its noise counts as error)"),
             files => format!("references: {}, {noise}", files.join(" and ")),
         };
     };
     let steps = scene.methods.iter().flat_map(|method| &method.steps);
     let most = steps.map(|step| step.samples).fold(1.0, f64::max);
-    let times = format!("{:.0} × the most", samples / most);
-    let kept = if reference.is_cached { ", kept" } else { "" };
-    format!("references: path, 2 × {samples:.0} samples ({times}), {noise}{kept}")
+    let times = format!("{:.0} × the largest step", samples / most);
+    let cached = if reference.is_cached { ", cached" } else { "" };
+    format!("references: path, 2 × {samples:.0} samples ({times}), {noise}{cached}")
 }
 
-fn of_step(name: &str, step: &Step, width: usize) -> String {
+fn of_step(name: &str, step: &StepResult, width: usize) -> String {
     let [least, most] = step.spread;
     format!(
         "{name:<width$} {:>8} {:>9}  {:>9} {:>9} {:>9} {:>10}",
@@ -70,22 +71,22 @@ fn of_step(name: &str, step: &Step, width: usize) -> String {
     )
 }
 
-/// A number of samples, without decimals if it is whole.
+/// Formats a number of samples, without decimals for integers.
 fn count(samples: f64) -> String {
     if samples.fract() == 0.0 { format!("{samples:.0}") } else { format!("{samples:.1}") }
 }
 
-/// An error in three digits. One that is not above 0 is less than the references can tell.
+/// Formats an error with three digits. Nonpositive errors are below the noise of the references.
 pub(super) fn error(value: f64) -> String {
     if value > 0.0 { format!("{value:.2e}") } else { "≈ 0".to_owned() }
 }
 
 fn speed(method: &MethodResult) -> String {
     let slope = method.slope.map_or(String::new(), |slope| format!(", slope {}", signed(slope)));
-    format!("set-up {}{slope}", words::seconds(method.setup_seconds))
+    format!("setup {}{slope}", words::seconds(method.setup_seconds))
 }
 
-/// When it reaches the usual errors.
+/// Describes when the target errors are reached.
 fn times(method: &MethodResult) -> Option<String> {
     let times = TARGETS.iter().zip(method.time_to).filter_map(|(target, time)| Some((target, time?)));
     let parts = times.map(|(target, TimeTo { seconds, is_measured })| {
@@ -96,26 +97,26 @@ fn times(method: &MethodResult) -> Option<String> {
     (!parts.is_empty()).then(|| format!("relMSE {}", parts.join(", ")))
 }
 
-/// `1 sample`
+/// Formats a number of samples with its unit, as in `1 sample`.
 pub(super) fn samples(samples: f64) -> String {
     format!("{} sample{}", count(samples), if samples == 1.0 { "" } else { "s" })
 }
 
-/// `−0.98 ± 0.02`
+/// Formats a slope, as in `−0.98 ± 0.02`.
 pub(super) fn signed(Slope { value, error }: Slope) -> String {
     let sign = if value < 0.0 { "−" } else { "" };
     format!("{sign}{:.2} ± {error:.2}", value.abs())
 }
 
-/// Words about a method's bias.
+/// Describes the bias of a method.
 fn verdict(method: &MethodResult) -> String {
     let at = method.steps.last().map_or(String::new(), |step| format!(" at {}", samples(step.samples)));
     let percent = |share: f64| format!("{:.0} % of the error", share * 100.0);
     match method.verdict {
-        Verdict::Unknown => "too few seeds to tell a bias".to_owned(),
-        Verdict::NoneFound { bound } => format!("no bias found by relMSE: it is below {}{at}", error(bound)),
+        Verdict::Unknown => "too few seeds to detect a bias".to_owned(),
+        Verdict::NoneFound { bound } => format!("no bias in relMSE, below {}{at}", error(bound)),
         Verdict::Falls { size, share } => {
-            format!("a bias that falls with the samples: {}, {}{at}", error(size), percent(share))
+            format!("bias that decreases with samples: {}, {}{at}", error(size), percent(share))
         }
         Verdict::Stays { size, share } => {
             let last =
@@ -125,7 +126,7 @@ fn verdict(method: &MethodResult) -> String {
     }
 }
 
-/// Words about the mean luminance at the last step.
+/// Describes the mean luminance at the last step.
 fn brightness(method: &MethodResult) -> Option<String> {
     let brightness = method.steps.last()?.brightness?;
     let percent = |part: f64| format!("{:.2} %", 100.0 * part.abs());
@@ -133,8 +134,8 @@ fn brightness(method: &MethodResult) -> Option<String> {
     let figures =
         format!("{} ± {} {side} the references", percent(brightness.value), percent(brightness.error));
     Some(match brightness.is_biased() {
-        true => format!("BIAS of the mean luminance: {figures}"),
-        false => format!("mean luminance: {figures}, by chance"),
+        true => format!("BIAS in mean luminance: {figures}"),
+        false => format!("mean luminance: {figures} (noise)"),
     })
 }
 
@@ -144,27 +145,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_fits_80_columns_and_says_what_is_biased() {
+    fn table_fits_80_columns_and_reports_bias() {
         let lines = table(&results());
         assert!(lines.iter().all(|line| line.chars().count() <= 80), "{}", lines.join("\n"));
         assert_eq!(lines[0], "a.toml, 128×96 pixels, 3 seeds");
-        assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the most), noise 1.00e-5");
+        assert_eq!(lines[1], "references: path, 2 × 4096 samples (64 × the largest step), noise 1.00e-5");
         assert_eq!(lines[3], "method   samples   seconds     relMSE     least  greatest s × relMSE");
         assert_eq!(lines[4], "path           1     10 ms    2.00e-1   1.80e-1   2.20e-1    2.00e-3");
-        assert_eq!(lines[13], "path: set-up 3.0 ms, slope −1.00 ± 0.00");
+        assert_eq!(lines[13], "path: setup 3.0 ms, slope −1.00 ± 0.00");
         assert_eq!(lines[14], "  relMSE 1e-2 in 200 ms, 1e-3 in about 2.00 s, 1e-4 in about 20.0 s");
-        assert_eq!(lines[15], "  no bias found by relMSE: it is below 1.00e-8 at 64 samples");
-        assert_eq!(lines[16], "  mean luminance: 1.00 % ± 0.10 % below the references, by chance");
+        assert_eq!(lines[15], "  no bias in relMSE, below 1.00e-8 at 64 samples");
+        assert_eq!(lines[16], "  mean luminance: 1.00 % ± 0.10 % below the references (noise)");
         assert!(
             lines[18].starts_with("  BIAS: 1.00e-2, 97 % of the error at 64 samples, last slope −0.0"),
             "{}",
             lines[18]
         );
-        assert_eq!(lines[19], "  BIAS of the mean luminance: 1.00 % ± 0.10 % below the references");
+        assert_eq!(lines[19], "  BIAS in mean luminance: 1.00 % ± 0.10 % below the references");
     }
 
     #[test]
-    fn what_the_references_cannot_tell_is_about_nothing() {
+    fn errors_below_the_noise_are_about_zero() {
         assert_eq!((error(-1e-9).as_str(), error(0.0123).as_str()), ("≈ 0", "1.23e-2"));
         assert_eq!((count(16.0).as_str(), count(16.25).as_str()), ("16", "16.2"));
     }

@@ -1,4 +1,4 @@
-//! `glimt bench`: error against time, as a table, as CSV, as JSON, as a plot.
+//! `glimt bench`: measures error against time. Writes a table, CSV, JSON and a plot.
 
 mod chart;
 mod outputs;
@@ -9,69 +9,77 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use self::outputs::Outputs;
-use self::progress::Said;
+use self::outputs::BenchOutputs;
+use self::progress::BenchProgress;
 use crate::args::BenchArgs;
 use crate::bench::baseline::{changes, lines};
 use crate::bench::table::table;
-use crate::bench::{self, News, Order, ReferenceOrder, Results, Steps, Toggles, Trouble, Unfinished, cache};
+use crate::bench::{
+    self, BenchError, BenchEvent, BenchRequest, ReferenceSource, Results, StepSchedule, Toggles, Unfinished,
+    cache,
+};
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
-use crate::signals::{self, Ended};
+use crate::signals::{self, ReceivedSignal};
 use crate::system::priority;
 use crate::system::threads::start_failure;
 
-/// Between two looks for a signal.
+/// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(args: &BenchArgs, console: &Console) -> Exit {
-    measured(args, console).unwrap_or_else(|exit| exit)
+    try_run(args, console).unwrap_or_else(|exit| exit)
 }
 
-/// Reports errors; `Err` has their exit code.
-fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
+/// Runs the benchmark and reports errors. `Err` is their exit code.
+fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     priority::lower_priority(args.nice);
     let order = order(args, console)?;
     let scenes = order.scenes.len();
-    let outputs = Outputs::of(args, &order.scenes, console)?;
+    let outputs = BenchOutputs::of(args, &order.scenes, console)?;
     let baseline = outputs.baseline(console)?;
-    // The first signal ends the work under way, another one the writing of the results so far.
+    // The first signal stops the measurement, the second one the writing of results.
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
         .map_err(|error| console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")))?;
-    let mut said = Said::new(args.progress, console);
-    let (news, work) = begin(order, token.clone())
+    let mut progress = BenchProgress::new(args.progress, console);
+    let (news, work) = start(order, token.clone())
         .map_err(|error| console.fail(Exit::FAILED, &start_failure("a thread", false, &error)))?;
-    follow(&news, &mut said);
-    let results = work.join().unwrap_or_else(|_| Err(Box::new(broken())));
-    said.end();
+    follow(&news, &mut progress);
+    let results = work.join().unwrap_or_else(|_| Err(Box::new(panicked())));
+    progress.end();
     match results {
         Ok(results) => {
-            say(&results, baseline.as_ref(), console);
-            outputs.write(&results, &said, console, if token.is_cancelled() { &writing } else { &token })?;
-            said.done(&results);
+            print_results(&results, baseline.as_ref(), console);
+            outputs.write(
+                &results,
+                &progress,
+                console,
+                if token.is_cancelled() { &writing } else { &token },
+            )?;
+            progress.done(&results);
             Ok(ended.by().map_or(Exit::DONE, Exit::signal))
         }
         Err(unfinished) => {
-            let Unfinished { trouble, done } = *unfinished;
-            // Nothing is measured where the call is wrong.
+            let Unfinished { error, done } = *unfinished;
+            // With invalid arguments nothing has been measured.
             if !done.scenes.is_empty() {
-                say(&done, baseline.as_ref(), console);
-                // Files that cannot be written are reported; the exit code is that of the first trouble.
-                let _ = outputs.write(&done, &said, console, &writing);
+                print_results(&done, baseline.as_ref(), console);
+                // Report files that cannot be written, but keep the exit code of the first error.
+                let _ = outputs.write(&done, &progress, console, &writing);
             }
-            Err(troubled(&trouble, &ended, (done.scenes.len(), scenes), &said, console))
+            Err(report_unfinished(&error, &ended, (done.scenes.len(), scenes), &progress, console))
         }
     }
 }
 
-/// The tables, the plots, and what changed since an older run.
-fn say(results: &Results, baseline: Option<&(String, Results)>, console: &Console) {
+/// Prints the tables, the plots and the comparison with the baseline.
+fn print_results(results: &Results, baseline: Option<&(String, Results)>, console: &Console) {
     table(results).iter().for_each(|line| console.answer(line));
     chart::show(results, console);
     if let Some((name, then)) = baseline {
@@ -79,14 +87,14 @@ fn say(results: &Results, baseline: Option<&(String, Results)>, console: &Consol
     }
 }
 
-/// The thread that measures.
-type Work = JoinHandle<Result<Results, Box<Unfinished>>>;
+/// The measuring thread.
+type Worker = JoinHandle<Result<Results, Box<Unfinished>>>;
 
-/// The work on a thread of its own, and what it says.
-fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, Work)> {
+/// Starts the benchmark on a thread. Returns its events.
+fn start(order: BenchRequest, token: CancelToken) -> std::io::Result<(Receiver<BenchEvent>, Worker)> {
     let (sender, news) = mpsc::channel();
-    let tell = move |one: News| {
-        // A front end that is gone needs no news.
+    let tell = move |one: BenchEvent| {
+        // Ignore a front end that has exited.
         let _ = sender.send(one);
     };
     let work = move || bench::run(&order, &token, &tell);
@@ -94,59 +102,59 @@ fn begin(order: Order, token: CancelToken) -> std::io::Result<(Receiver<News>, W
     Ok((news, thread))
 }
 
-/// Reports news until the work is over.
-fn follow(news: &Receiver<News>, said: &mut Said) {
+/// Reports events until the thread ends.
+fn follow(news: &Receiver<BenchEvent>, progress: &mut BenchProgress) {
     loop {
         match news.recv_timeout(TICK) {
-            Ok(one) => said.hear(one),
-            Err(RecvTimeoutError::Timeout) => said.tick(),
+            Ok(one) => progress.handle(one),
+            Err(RecvTimeoutError::Timeout) => progress.tick(),
             Err(RecvTimeoutError::Disconnected) => return,
         }
     }
 }
 
-/// A panic has said what it was.
-fn broken() -> Unfinished {
-    let what = "internal error: a part of the renderer gave up".to_owned();
-    Unfinished { trouble: Trouble::Failed(Failure::Work(what)), done: Results::default() }
+/// The result after a panic, which has printed its message.
+fn panicked() -> Unfinished {
+    let what = "internal error: the renderer panicked".to_owned();
+    Unfinished { error: BenchError::Failed(Failure::Work(what)), done: Results::default() }
 }
 
-/// `scenes` are how many were measured, and of how many.
-fn troubled(
-    trouble: &Trouble,
-    ended: &Ended,
+/// Reports why the benchmark is unfinished. `scenes` are the numbers of measured and of all scenes.
+fn report_unfinished(
+    error: &BenchError,
+    ended: &ReceivedSignal,
     scenes: (usize, usize),
-    said: &Said,
+    progress: &BenchProgress,
     console: &Console,
 ) -> Exit {
     if let Some(number) = ended.by() {
         if let Some(signal) = signals::name(number) {
             let (done, all) = scenes;
-            said.cancelled(&format!(
-                "ended by {signal} after {done} of {all} scenes; finished references are kept"
+            progress.cancelled(&format!(
+                "terminated by {signal} after {done} of {all} scenes; finished references are cached"
             ));
         }
         return Exit::signal(number);
     }
-    match trouble {
-        Trouble::Failed(Failure::Scene(diagnostics)) => {
-            if said.is_for_people() {
+    match error {
+        BenchError::Failed(Failure::Scene(diagnostics)) => {
+            if progress.is_text() {
                 console.diagnostics(diagnostics);
             } else {
                 let messages: Vec<_> = diagnostics.iter().map(in_a_line).collect();
-                said.failed("scene", &messages.join("; "));
+                progress.failed("scene", &messages.join("; "));
             }
             Exit::WRONG
         }
-        Trouble::Failed(Failure::Work(message)) => {
-            said.failed("work", &format!("error: {message}"));
+        BenchError::Failed(Failure::Work(message)) => {
+            progress.failed("work", &format!("error: {message}"));
             Exit::FAILED
         }
-        Trouble::Call(message) => {
-            said.failed("call", &format!("error: {message}"));
+        BenchError::Call(message) => {
+            progress.failed("call", &format!("error: {message}"));
             Exit::WRONG
         }
-        Trouble::Cancelled => Exit::FAILED,
+        BenchError::Cancelled => Exit::FAILED,
     }
 }
 
@@ -154,11 +162,11 @@ fn in_a_line(diagnostic: &Diagnostic) -> String {
     format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 
-/// The order that the arguments mean.
-fn order(args: &BenchArgs, console: &Console) -> Result<Order, Exit> {
+/// Lowers the arguments.
+fn order(args: &BenchArgs, console: &Console) -> Result<BenchRequest, Exit> {
     let folder = if args.no_cache { None } else { args.cache.clone().or_else(cache::folder) };
     let scenes = if args.scenes.is_empty() {
-        vec![own_scene(folder.as_deref(), console)?]
+        vec![starter_scene(folder.as_deref(), console)?]
     } else {
         args.scenes.clone()
     };
@@ -166,7 +174,7 @@ fn order(args: &BenchArgs, console: &Console) -> Result<Order, Exit> {
         return Err(console.fail(Exit::WRONG, &format!("{} is given twice", twice.display())));
     }
     let outputs = [&args.csv, &args.json, &args.plot];
-    Ok(Order {
+    Ok(BenchRequest {
         reference: reference(args, scenes.len(), console)?,
         scenes,
         common: Overrides {
@@ -194,37 +202,35 @@ fn order(args: &BenchArgs, console: &Console) -> Result<Order, Exit> {
     })
 }
 
-/// In rising order, each once.
-fn steps(args: &BenchArgs) -> Steps {
+/// The requested steps, sorted and without duplicates.
+fn steps(args: &BenchArgs) -> StepSchedule {
     let (mut samples, mut seconds) = (args.samples.clone(), args.time.clone());
     samples.sort_unstable();
     samples.dedup();
     seconds.sort_by(f64::total_cmp);
     seconds.dedup();
     match (samples.is_empty(), seconds.is_empty()) {
-        (false, _) => Steps::Samples(samples),
-        (true, false) => Steps::Seconds(seconds),
-        (true, true) => Steps::Climb,
+        (false, _) => StepSchedule::Samples(samples),
+        (true, false) => StepSchedule::Seconds(seconds),
+        (true, true) => StepSchedule::Climb,
     }
 }
 
-fn reference(args: &BenchArgs, scenes: usize, console: &Console) -> Result<ReferenceOrder, Exit> {
+fn reference(args: &BenchArgs, scenes: usize, console: &Console) -> Result<ReferenceSource, Exit> {
     match (args.reference.as_slice(), args.reference_samples) {
-        ([], Some(samples)) => Ok(ReferenceOrder::Samples(samples)),
-        ([], None) => Ok(ReferenceOrder::InTime),
-        (_, _) if scenes != 1 => {
-            Err(console.fail(Exit::WRONG, "--reference belongs to one scene: measure one at a time"))
-        }
-        ([one], _) => Ok(ReferenceOrder::Files([one.clone(), one.clone()])),
-        ([one, two], _) => Ok(ReferenceOrder::Files([one.clone(), two.clone()])),
+        ([], Some(samples)) => Ok(ReferenceSource::Samples(samples)),
+        ([], None) => Ok(ReferenceSource::InTime),
+        (_, _) if scenes != 1 => Err(console.fail(Exit::WRONG, "--reference works with a single scene")),
+        ([one], _) => Ok(ReferenceSource::Files([one.clone(), one.clone()])),
+        ([one, two], _) => Ok(ReferenceSource::Files([one.clone(), two.clone()])),
         (_, _) => Err(console.fail(Exit::WRONG, "--reference is given more than twice")),
     }
 }
 
-/// The scene that `glimt new` writes, beside the references.
-fn own_scene(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
+/// The scene that `glimt new` writes, stored with the cached references.
+fn starter_scene(folder: Option<&Path>, console: &Console) -> Result<PathBuf, Exit> {
     match folder.map(cache::starter) {
         Some(made) => made.map_err(|error| console.fail(Exit::FAILED, &error.to_string())),
-        None => Err(console.fail(Exit::WRONG, "no scene is given; see glimt bench --help")),
+        None => Err(console.fail(Exit::WRONG, "no scene given; see glimt bench --help")),
     }
 }

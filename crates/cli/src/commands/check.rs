@@ -1,4 +1,4 @@
-//! `glimt check`: is everything right that a scene names?
+//! `glimt check`: validates a scene and its files.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
     }
 }
 
-/// The same as one JSON object on stdout.
+/// Reports the result as one JSON object on stdout.
 fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let (exit, diagnostics) = match check(scene, sets) {
         Ok(checked) => (Exit::DONE, checked.warnings),
@@ -66,7 +66,7 @@ fn summary(scene: &Path, checked: &Checked) -> String {
     format!("ok: {}: {}{warnings}", scene.display(), parts.join(", "))
 }
 
-/// A number with its noun in the right form.
+/// Formats a number with its noun in singular or plural.
 pub(crate) fn count(number: u64, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_summary_counts_in_english() {
+    fn summary_uses_singular_and_plural() {
         let checked = Checked { objects: 1, triangles: 0, textures: 2, lights: 3, warnings: Vec::new() };
         let text = summary(Path::new("a.toml"), &checked);
         assert_eq!(text, "ok: a.toml: 1 object, 0 triangles, 2 textures, 3 lights");

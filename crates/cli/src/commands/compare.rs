@@ -1,4 +1,4 @@
-//! `glimt compare`: the error of a picture against a reference, as a table, as JSON, as a picture.
+//! `glimt compare`: measures the error of an image against a reference. Writes a table, JSON or an image.
 
 mod pictures;
 
@@ -27,15 +27,15 @@ pub(crate) fn run(args: &CompareArgs, console: &Console) -> Exit {
     }
 }
 
-/// Reports errors; `Err` has their exit code.
+/// Runs the comparison and reports errors. `Err` is their exit code.
 fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Exit, Exit> {
-    let diff = args.diff.as_deref().map(|path| Diff::check(path, args, console)).transpose()?;
+    let diff = args.diff.as_deref().map(|path| ErrorImage::check(path, args, console)).transpose()?;
     let pair = Pair::load(&args.a, &args.b).map_err(|errors| {
         errors.iter().for_each(|error| console.say(&format!("error: {error}")));
         Exit::WRONG
     })?;
     pair.warnings().iter().for_each(|warning| console.say(&format!("warning: {warning}")));
-    warn_of_one_file(args, console);
+    warn_about_same_file(args, console);
     let measured = pool.install(|| compare::measure(&pair));
     let errors = &measured.errors;
     let bias = Bias::new(errors, [&args.a, &args.b].map(|path| output::mean_luminance_error(path)));
@@ -50,7 +50,7 @@ fn run_in(pool: &ThreadPool, args: &CompareArgs, console: &Console) -> Result<Ex
         let written = pool.install(|| diff.write(args, &pair, &measured));
         let lost = written.map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
         lost.iter().for_each(|what| console.say(&format!("warning: {what}")));
-        console.say(&format!("wrote {} ({})", diff.path.display(), diff.shows()));
+        console.say(&format!("wrote {} ({})", diff.path.display(), diff.description()));
     }
     Ok(judge(&summary, console))
 }
@@ -59,38 +59,36 @@ fn judge(summary: &Summary<'_>, console: &Console) -> Exit {
     match summary.max_relmse {
         Some(most) if !summary.is_within => {
             let relmse = figure(summary.relmse);
-            console.fail(Exit::FAILED, &format!("relMSE is {relmse}, above the {most} of --max-relmse"))
+            console.fail(Exit::FAILED, &format!("relMSE {relmse} is above --max-relmse {most}"))
         }
         Some(_) | None => Exit::DONE,
     }
 }
 
-fn warn_of_one_file(args: &CompareArgs, console: &Console) {
+fn warn_about_same_file(args: &CompareArgs, console: &Console) {
     let identity = FileIdentity::of(&args.a);
     if identity.is_some() && identity == FileIdentity::of(&args.b) {
         let (a, b) = (args.a.display(), args.b.display());
         let which = if args.a == args.b {
             format!("{a} is given twice")
         } else {
-            format!("{a} and {b} are one file")
+            format!("{a} and {b} are the same file")
         };
-        console.say(&format!(
-            "warning: {which}: there is no error, whatever it holds; name a picture and a reference"
-        ));
+        console.say(&format!("warning: {which}, so the error is 0; pass an image and a reference"));
     }
 }
 
-/// A picture of the error, to be written.
-struct Diff<'a> {
+/// The image of the error.
+struct ErrorImage<'a> {
     path: &'a Path,
     format: Format,
 }
 
-impl<'a> Diff<'a> {
-    /// Reports the errors that are known before the work.
+impl<'a> ErrorImage<'a> {
+    /// Reports errors that can be detected before measuring.
     fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
         let format = Format::of(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
-        check_no_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
+        check_not_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
         output::check_target(path).map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
         Ok(Self { path, format })
     }
@@ -102,15 +100,15 @@ impl<'a> Diff<'a> {
         }
     }
 
-    fn shows(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         if self.is_float() {
             "|a - b| of each channel, linear"
         } else {
-            "FLIP of each pixel: black 0, then purple, red, orange, to pale yellow 1"
+            "FLIP in false color, from black (0) to pale yellow (1)"
         }
     }
 
-    /// Writes it. Gives what of the file that was there could not be kept.
+    /// Writes the image. Returns a warning about lost properties of the replaced file.
     fn write(
         &self,
         args: &CompareArgs,
@@ -119,13 +117,13 @@ impl<'a> Diff<'a> {
     ) -> Result<Option<String>, OutputError> {
         let image: RadianceImage =
             if self.is_float() { compare::absolute(pair) } else { compare::heat(pair, &measured.flip) };
-        let note = format!("{}; a: {}, b: {}", self.shows(), args.a.display(), args.b.display());
+        let note = format!("{}; a: {}, b: {}", self.description(), args.a.display(), args.b.display());
         let options =
             EncodeOptions { metadata: vec![("Error".to_owned(), note)], ..EncodeOptions::default() };
         let token = CancelToken::new();
         let bytes = output::encode(&image, &options, self.format, &token)?;
-        let may_replace = |real: &Path| check_no_input(self.path, real, args);
-        let is_kept = |path: &Path| check_no_input(path, path, args).is_err();
+        let may_replace = |real: &Path| check_not_input(self.path, real, args);
+        let is_kept = |path: &Path| check_not_input(path, path, args).is_err();
         let lost = RefCell::new(None);
         let losses = Losses::Told(&|what| drop(lost.replace(Some(what))));
         let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
@@ -134,11 +132,11 @@ impl<'a> Diff<'a> {
     }
 }
 
-/// The target, which leads to `real`, must not be A or B.
-fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
+/// Checks that the target, which resolves to `real`, is not A or B.
+fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
     if is_part(real) {
         let reason = format!(
-            "cannot write {}: it is a part or a checkpoint; name another file with --diff FILE",
+            "cannot write {}: it is a part or checkpoint; choose another file with --diff FILE",
             path.display()
         );
         return Err(OutputError::Refused { reason });
@@ -148,7 +146,7 @@ fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), Ou
             let other = if path == input { String::new() } else { format!("{}, ", input.display()) };
             let name = path.display();
             let reason = format!(
-                "cannot write {name}: it is {other}one of the pictures compared; name another file with --diff FILE"
+                "cannot write {name}: it is {other}one of the compared images; choose another file with --diff FILE"
             );
             Err(OutputError::Refused { reason })
         }
@@ -156,7 +154,7 @@ fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), Ou
     }
 }
 
-/// Figures for the table, and keys of the JSON object.
+/// Values of the table and the JSON object.
 #[derive(Serialize)]
 struct Summary<'a> {
     a: String,
@@ -176,7 +174,7 @@ struct Summary<'a> {
     bias_standard_error: Option<f64>,
     bias_z: Option<f64>,
     max_relmse: Option<f64>,
-    /// Whether relMSE is not above that.
+    /// Whether relMSE is at most `max_relmse`.
     is_within: bool,
 }
 
@@ -206,7 +204,7 @@ impl<'a> Summary<'a> {
     }
 }
 
-/// A value that is not finite becomes null.
+/// Prints the JSON object. Values that are not finite become null.
 fn say_json(summary: &Summary<'_>, console: &Console) {
     match output::json::in_a_line(summary) {
         Ok(text) => console.answer(&text),
@@ -218,30 +216,30 @@ fn say_table(summary: &Summary<'_>, console: &Console) {
     table(summary, console.answer_columns()).iter().for_each(|line| console.answer(line));
 }
 
-/// Lines of the table, broken between words if they are wider than so many columns.
+/// Lines of the table, wrapped to `columns`.
 fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
     let Summary { a, b, width, height, .. } = summary;
-    let title = format!("{a} against the reference {b}, {width}×{height} pixels");
+    let title = format!("{a} compared with reference {b}, {width}×{height} pixels");
     let rows = rows(summary).into_iter().flat_map(|(name, value, unit, note)| {
         row(&format!("{name:<16}{value:>12} {unit:<4}"), &note, columns)
     });
-    let end = "Better is: PSNR higher, SSIM nearer to 1, everything else nearer to 0.";
-    let mut lines = broken(&title, columns);
+    let end = "Higher is better for PSNR and SSIM; lower for the rest.";
+    let mut lines = wrap(&title, columns);
     lines.push(String::new());
     lines.extend(rows);
     lines.push(String::new());
-    lines.extend(broken(end, columns));
+    lines.extend(wrap(end, columns));
     lines
 }
 
-/// Figures with their description beside them, or below them if there is no room.
+/// Values with their description to the right, or below if there is no room.
 fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
-    /// Narrower notes are hard to read.
-    const LEAST: usize = 24;
+    /// Least width of a description.
+    const MIN_NOTE_COLUMNS: usize = 24;
     const INDENT: usize = 4;
     let start = figures.chars().count();
     let Some(columns) = columns else { return vec![format!("{figures}{note}").trim_end().to_owned()] };
-    let is_beside = columns >= start + LEAST;
+    let is_beside = columns >= start + MIN_NOTE_COLUMNS;
     let indent = if is_beside { start } else { INDENT };
     let mut note = wrapped(note, columns.saturating_sub(indent).max(1));
     let first = if is_beside && !note.is_empty() { note.remove(0) } else { String::new() };
@@ -250,20 +248,23 @@ fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
     std::iter::once(first).chain(rest).collect()
 }
 
-fn broken(text: &str, columns: Option<usize>) -> Vec<String> {
+fn wrap(text: &str, columns: Option<usize>) -> Vec<String> {
     columns.map_or_else(|| vec![text.to_owned()], |columns| wrapped(text, columns))
 }
 
-/// A bias over its standard error from which on noise is no explanation: chance gives it once in a million times.
-const FAR_BEYOND_NOISE: f64 = 5.0;
+/// z above which a bias is reported as significant: noise exceeds it about once in two million comparisons.
+const SIGNIFICANT_Z: f64 = 5.0;
 
-/// Name, value, unit, and what it is of.
+/// Remark about a significant bias.
+const SIGNIFICANT: &str = ": significant, not explained by noise";
+
+/// Name, value, unit and description of each row.
 fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, String)> {
     let pixels = u64::from(summary.width) * u64::from(summary.height);
     let [x, y] = summary.max_at;
-    let trimmed = format!("the same, without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
+    let trimmed = format!("without the worst 0.1 %: {} of {pixels} pixels", summary.dropped_pixels);
     let place = if summary.max > 0.0 { format!(", at pixel ({x}, {y})") } else { String::new() };
-    let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels a degree; mean, 0 to 1");
+    let flip = format!("clamped sRGB, {PIXELS_PER_DEGREE} pixels per degree; mean, 0 to 1");
     let mut rows = vec![
         ("RMSE", figure(summary.rmse), "", "linear".to_owned()),
         ("relMSE", figure(summary.relmse), "", "linear: mean of (a - b)²/(b² + 0.01)".to_owned()),
@@ -280,8 +281,8 @@ fn rows(summary: &Summary<'_>) -> Vec<(&'static str, String, &'static str, Strin
         rows.push(("bias", signed(bias), "", format!("linear: mean(a - b)/mean(b); {noise}")));
     }
     if let Some(z) = summary.bias_z {
-        let verdict = if z.abs() > FAR_BEYOND_NOISE { ": far beyond 3, it is no noise" } else { "" };
-        rows.push(("bias, z", format!("{z:.2}"), "", format!("bias over its standard error{verdict}")));
+        let verdict = if z.abs() > SIGNIFICANT_Z { SIGNIFICANT } else { "" };
+        rows.push(("bias, z", format!("{z:.2}"), "", format!("bias / standard error{verdict}")));
     }
     rows
 }
@@ -291,7 +292,7 @@ fn signed(value: f64) -> String {
     format!("{sign}{}", figure(value.abs()))
 }
 
-/// Six digits that count.
+/// Formats six significant digits.
 fn figure(value: f64) -> String {
     let is_short = (1e-4..1e6).contains(&value);
     let decimals = if is_short { (5.0 - libm::log10(value).floor()).max(0.0) as usize } else { 5 };
@@ -334,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_as_wide_as_the_terminal_and_breaks_between_words() {
+    fn tables_wrap_to_the_terminal() {
         let summary = summary();
         let words =
             |lines: &[String]| lines.join(" ").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -349,16 +350,16 @@ mod tests {
     }
 
     #[test]
-    fn a_bias_that_chance_explains_is_not_said_to_be_none() {
+    fn only_large_z_is_called_significant() {
         for (z, is_far) in [(0.5, false), (-3.5, false), (5.5, true), (-40.0, true)] {
             let lines = table(&Summary { bias_z: Some(z), ..summary() }, None);
             let line = lines.iter().find(|line| line.contains("bias, z")).expect("a line");
-            assert_eq!(line.contains("far beyond 3"), is_far, "{line}");
+            assert_eq!(line.contains(SIGNIFICANT), is_far, "{line}");
         }
     }
 
     #[test]
-    fn figures_have_the_digits_that_count() {
+    fn figures_have_six_significant_digits() {
         let cases = [
             (0.0, "0"),
             (0.012_345_678, "0.0123457"),

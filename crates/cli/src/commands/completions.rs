@@ -1,6 +1,6 @@
-//! `glimt completions`: the script that makes a shell complete, and the calls that the script makes.
+//! `glimt completions`: shell completion scripts, and the calls that they make.
 //!
-//! The script asks the program at each press of the key, so that it knows the tables, names and keys of the scene in the line.
+//! The scripts call glimt for every completion, so that the scene on the command line determines the tables, names and keys.
 
 mod bash;
 mod powershell;
@@ -18,10 +18,10 @@ use crate::args::{Args, Shell};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// The variable that a script sets to the name of its shell.
+/// The variable that scripts set to the name of the shell.
 const VARIABLE: &str = "GLIMT_COMPLETE";
 
-/// The script for zsh, in place of `clap_complete`'s, which puts a space behind `KEY=`.
+/// The script for zsh. `clap_complete`'s own script adds a space after `KEY=`.
 const ZSH: &str = r#"#compdef glimt
 _glimt_complete() {
     local answer=("${(@f)$(
@@ -29,7 +29,7 @@ _glimt_complete() {
     )}")
     local -a folders=() begun=() whole=()
     local line value
-    # A description stands behind the first colon.
+    # The description follows the first colon.
     for line in $answer; do
         value=${line%%:*}
         case $value in
@@ -43,7 +43,7 @@ _glimt_complete() {
     (($#whole)) && _describe -V values whole
 }
 compdef _glimt_complete glimt
-# In a folder of `fpath`, zsh reads this when the key is pressed first, as a function of the file's name.
+# If the script is in a folder of `fpath`, zsh loads it on the first completion, as a function named like the file.
 if [[ $funcstack[1] == _glimt ]]; then
     _glimt_complete "$@"
 fi
@@ -67,11 +67,11 @@ pub(crate) fn run(shell: Shell, console: &Console) -> Exit {
             console.text(&String::from_utf8_lossy(&script));
             Exit::DONE
         }
-        Err(error) => console.fail(Exit::FAILED, &format!("cannot make the script: {error}")),
+        Err(error) => console.fail(Exit::FAILED, &format!("cannot create the script: {error}")),
     }
 }
 
-/// Answers a call of a shell's script. `None` if the call is not one.
+/// Answers a call of a completion script. `None` if this is not such a call.
 pub(crate) fn answer(arguments: &[OsString]) -> Option<Exit> {
     std::env::var_os(VARIABLE)?;
     let folder = std::env::current_dir().ok();
@@ -81,7 +81,7 @@ pub(crate) fn answer(arguments: &[OsString]) -> Option<Exit> {
     match complete.try_complete(arguments, folder.as_deref()) {
         Ok(true) => Some(Exit::DONE),
         Ok(false) => None,
-        // The shell shows nothing of it.
+        // The script discards stderr.
         Err(_) => Some(Exit::FAILED),
     }
 }

@@ -1,4 +1,4 @@
-//! `glimt doctor`: what the program finds where it runs.
+//! `glimt doctor`: reports the environment that glimt detects.
 
 use std::env::consts::{ARCH, OS};
 use std::path::Path;
@@ -10,13 +10,13 @@ use crate::console::Console;
 use crate::exit::Exit;
 use crate::tui::{self, ColorDepth, Probe, ProbeReplies, probe};
 
-/// Prints a line for each finding.
+/// Prints one line per finding.
 pub(crate) fn run(console: &Console) -> Exit {
     let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
     lines.extend([("processor", processor()), ("threads", threads())]);
     match probe() {
         Some(probe) => lines.extend(terminal(&probe)),
-        None => lines.push(("terminal", "none: stdin and stdout are not one; `--once` works".to_owned())),
+        None => lines.push(("terminal", "none (not a tty); use --once".to_owned())),
     }
     lines.extend([("editor", editor()), ("cache", cache_folder())]);
     for (name, finding) in lines {
@@ -31,31 +31,31 @@ fn variable(name: &str) -> Option<String> {
 
 fn processor() -> String {
     let words = |instructions| match instructions {
-        InstructionSet::Portable => "no vector instructions that glimt uses",
+        InstructionSet::Portable => "no supported SIMD instructions",
         InstructionSet::Avx2 => "AVX2",
         InstructionSet::Avx512 => "AVX-512",
     };
     let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.available());
     match variable("GLIMT_SIMD") {
-        Some(asked) => format!("{} by GLIMT_SIMD={asked}; it has {}", words(used), words(best)),
+        Some(asked) => format!("{} (GLIMT_SIMD={asked}); available: {}", words(used), words(best)),
         None => words(used).to_owned(),
     }
 }
 
 fn threads() -> String {
     match std::thread::available_parallelism() {
-        Ok(threads) => format!("{threads}, as many as a render uses"),
-        Err(error) => format!("unknown ({error}): a render uses one"),
+        Ok(threads) => format!("{threads}, the default for renders"),
+        Err(error) => format!("unknown ({error}); the default is 1"),
     }
 }
 
-/// The lines about a terminal.
+/// Lines about the terminal.
 fn terminal(probe: &Probe) -> Vec<(&'static str, String)> {
     let term = variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
     let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
     let size = match (columns, rows) {
-        (0, _) | (_, 0) => "of unknown size".to_owned(),
+        (0, _) | (_, 0) => "unknown size".to_owned(),
         _ => format!("{columns} × {rows} cells of {width} × {height} pixels"),
     };
     let way = match (probe.is_multiplexed, probe.is_remote) {
@@ -83,7 +83,7 @@ fn colors(probe: &Probe) -> String {
     let background = probe.answers.as_ref().and_then(|answers| answers.background);
     let background = background
         .map_or(String::new(), |[red, green, blue]| format!("; background #{red:02x}{green:02x}{blue:02x}"));
-    format!("{depth} by the environment{asked}{background}")
+    format!("{depth} according to the environment{asked}{background}")
 }
 
 fn preview(probe: &Probe) -> String {
@@ -96,7 +96,7 @@ fn preview(probe: &Probe) -> String {
     ];
     let pixels: Vec<&str> = pixels.into_iter().flatten().collect();
     let more = match pixels.as_slice() {
-        [] => "no protocol for pixels".to_owned(),
+        [] => "no pixel protocol".to_owned(),
         some => format!("pixels with --preview {}", some.join(" or ")),
     };
     format!("{}; {more}", probe.preview())
@@ -104,20 +104,20 @@ fn preview(probe: &Probe) -> String {
 
 fn round_trip(answers: Option<&ProbeReplies>) -> String {
     let Some(answers) = answers else { return "the terminal does not answer".to_owned() };
-    let whole = if answers.is_synchronized { "; frames appear at once" } else { "" };
+    let whole = if answers.is_synchronized { "; synchronized output" } else { "" };
     format!("{:.1} ms{whole}", answers.round_trip.as_secs_f64() * 1e3)
 }
 
 fn editor() -> String {
     match tui::editor(|name| std::env::var(name).ok()) {
-        (editor, Some(variable)) => format!("{editor}, by {variable}"),
-        (editor, None) => format!("{editor}: neither VISUAL nor EDITOR is set"),
+        (editor, Some(variable)) => format!("{editor} (from {variable})"),
+        (editor, None) => format!("{editor} (neither VISUAL nor EDITOR is set)"),
     }
 }
 
 fn cache_folder() -> String {
     let Some(folder) = cache::folder() else {
-        return "none: neither XDG_CACHE_HOME nor HOME is set".to_owned();
+        return "none (neither XDG_CACHE_HOME nor HOME is set)".to_owned();
     };
     let name = folder.display();
     match std::fs::read_dir(&folder) {
@@ -127,7 +127,7 @@ fn cache_folder() -> String {
             let bytes = sizes.iter().sum::<u64>();
             format!("{name}: {}, {:.1} MB", count(sizes.len() as u64, "file"), bytes as f64 / 1e6)
         }
-        Err(_) if !exists(&folder) => format!("{name}: not there yet, `bench` makes it"),
+        Err(_) if !exists(&folder) => format!("{name}: does not exist yet; created by `bench`"),
         Err(error) => format!("{name}: cannot be read: {error}"),
     }
 }

@@ -1,4 +1,4 @@
-//! `glimt explain`: the meaning of a key, from the definition.
+//! `glimt explain`: describes scene keys.
 
 use crate::console::{Console, answer_columns};
 use crate::exit::Exit;
@@ -8,7 +8,7 @@ use crate::scene::nearest::{meant, nearest};
 use crate::scene::sanitize::shortened;
 use crate::tui::wrapped;
 
-/// Prints what is known by a path of a key, of a type, of a table; without one, all tables.
+/// Prints the description of a key, a type or a table, or a list of all tables.
 pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     let text = match path {
         None => Some(overview()),
@@ -16,34 +16,34 @@ pub(crate) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.text(&fitted(&text, answer_columns()));
+            console.text(&wrap_indented(&text, answer_columns()));
             Exit::DONE
         }
         None => console.fail(Exit::WRONG, &unknown(path.unwrap_or_default())),
     }
 }
 
-/// The text in lines of at most so many columns; what goes on stands under the column where it begins.
-fn fitted(text: &str, columns: usize) -> String {
+/// Wraps a text to `columns`, with hanging indents.
+fn wrap_indented(text: &str, columns: usize) -> String {
     let mut fitted = String::new();
     for line in text.lines() {
-        // A name and its description have two spaces or more between them.
+        // A name and its description are separated by at least two spaces.
         let indent = line.len() - line.trim_start().len();
         let gap = line[indent..].find("  ").map(|at| &line[indent + at..]);
         let begin = gap.map_or(indent, |gap| line.len() - gap.trim_start().len());
         let (name, rest) = line.split_at(begin);
         let room = columns.saturating_sub(name.chars().count());
-        let lines = if room < LEAST_COLUMNS { vec![rest.to_owned()] } else { wrapped(rest, room) };
+        let lines = if room < MIN_COLUMNS { vec![rest.to_owned()] } else { wrapped(rest, room) };
         let between = format!("\n{}", " ".repeat(name.chars().count()));
         fitted.push_str(&format!("{name}{}\n", lines.join(&between)));
     }
     fitted
 }
 
-/// Texts are not broken into lines shorter than this.
-const LEAST_COLUMNS: usize = 16;
+/// Least width for wrapping.
+const MIN_COLUMNS: usize = 16;
 
-/// Whether tables may be of a type.
+/// Whether a table has a type of this name.
 fn has_type(table: &TableInfo, name: &str) -> bool {
     table.types.iter().any(|kind| kind.name == name)
 }
@@ -53,23 +53,23 @@ fn overview() -> String {
     tables().iter().map(line).collect()
 }
 
-/// The text about a path. `None` if nothing has it.
+/// Describes a path. `None` if it does not exist.
 fn explained(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
     let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {
         [] => None,
-        [(path, key)] => Some(one(path, key)),
+        [(path, key)] => Some(key_details(path, key)),
         [(first, _), ..] => {
-            let texts: String = all.iter().map(|(path, key)| short(path, key)).collect();
-            Some(format!("{texts}\nMore about one of them: glimt explain {first}\n"))
+            let texts: String = all.iter().map(|(path, key)| key_summary(path, key)).collect();
+            Some(format!("{texts}\nFor details, run for example: glimt explain {first}\n"))
         }
     };
     match parts.as_slice() {
         [name] => match table(name) {
-            Some(table) => Some(whole_table(table)),
+            Some(table) => Some(table_details(table)),
             None if tables().iter().any(|table| has_type(table, name)) => {
                 let types = tables().iter().filter(|table| has_type(table, name));
-                let texts = types.filter_map(|table| Some(whole_type(table, table.type_of(Some(name))?)));
+                let texts = types.filter_map(|table| Some(type_details(table, table.type_of(Some(name))?)));
                 Some(texts.collect::<Vec<_>>().join("\n"))
             }
             None => found(all_keys().filter(|(_, key)| key.name == *name).collect()),
@@ -77,7 +77,7 @@ fn explained(path: &str) -> Option<String> {
         [name, second] => {
             let table = table(name)?;
             if let Some(kind) = table.type_of(Some(second)) {
-                return Some(whole_type(table, kind));
+                return Some(type_details(table, kind));
             }
             if *second == "type" && !table.types.is_empty() {
                 return Some(types(table));
@@ -103,7 +103,7 @@ fn explained(path: &str) -> Option<String> {
     }
 }
 
-/// Every key with its path, those of types with their type.
+/// All keys with their paths, including their types.
 fn all_keys() -> impl Iterator<Item = (String, &'static KeyInfo)> {
     tables().iter().flat_map(keys_of)
 }
@@ -115,8 +115,8 @@ fn keys_of(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static 
     own.chain(table.keys.iter().map(|key| (format!("{}.{}", table.name, key.name), key)))
 }
 
-/// The text about a key: its description, type, range, default, and an example.
-fn one(path: &str, key: &KeyInfo) -> String {
+/// Describes a key: description, type, unit, range, default and an example.
+fn key_details(path: &str, key: &KeyInfo) -> String {
     let mut text = format!("{path}\n    {}\n\n", sentence(key.doc));
     let mut row = |name: &str, value: String| {
         if !value.is_empty() {
@@ -143,8 +143,8 @@ fn one(path: &str, key: &KeyInfo) -> String {
     text
 }
 
-/// The text about one of several keys: kind, unit, range and default in a line, and the description.
-fn short(path: &str, key: &KeyInfo) -> String {
+/// Describes one of several keys: type, unit, range and default on one line, followed by the description.
+fn key_summary(path: &str, key: &KeyInfo) -> String {
     let default = match key.default {
         Default::Required(_) => "required".to_owned(),
         Default::Is(_) | Default::By(_) => format!("default {}", plain(&key.default_words())),
@@ -155,8 +155,8 @@ fn short(path: &str, key: &KeyInfo) -> String {
     format!("{path}: {}\n    {}\n", facts.join("; "), sentence(key.doc))
 }
 
-/// A table with a line for each of its types and keys.
-fn whole_table(table: &'static TableInfo) -> String {
+/// Describes a table, with a line for each type and key.
+fn table_details(table: &'static TableInfo) -> String {
     let head = format!("{}\n    {}\n\n", table.head(), sentence(table.doc));
     let types = if table.types.is_empty() { String::new() } else { format!("{}\n", types(table)) };
     format!("{head}{types}{}", list(table.keys.iter()))
@@ -167,11 +167,11 @@ fn types(table: &TableInfo) -> String {
     let line =
         |kind: &TypeInfo| format!("    type = {:<15}{}\n", format!("\"{}\"", kind.name), plain(kind.doc));
     let lines: String = table.types.iter().map(line).collect();
-    format!("{lines}    without `type`: \"{default}\"\n")
+    format!("{lines}    the default is \"{default}\"\n")
 }
 
-/// A type with a line for each of its keys, and for those of every type.
-fn whole_type(table: &'static TableInfo, kind: &'static TypeInfo) -> String {
+/// Describes a type, with a line for each of its keys and the common ones.
+fn type_details(table: &'static TableInfo, kind: &'static TypeInfo) -> String {
     let head = format!("{}, type = \"{}\"\n    {}\n\n", table.head(), kind.name, sentence(kind.doc));
     format!("{head}{}", list(table.keys_of(Some(kind))))
 }
@@ -180,7 +180,7 @@ fn list(keys: impl Iterator<Item = &'static KeyInfo>) -> String {
     keys.map(|key| format!("    {:<22}{}\n", key.name, plain(key.doc))).collect()
 }
 
-/// Text for a terminal: code without its marks.
+/// Removes the backticks of Markdown.
 fn plain(text: &str) -> String {
     text.replace('`', "")
 }
@@ -189,7 +189,7 @@ fn sentence(text: &str) -> String {
     format!("{}.", plain(text))
 }
 
-/// The message about a path that nothing has, with the nearest ones.
+/// Message about an unknown path, with a suggestion.
 fn unknown(path: &str) -> String {
     let shown = shortened(path, 60);
     let all = paths();
@@ -197,7 +197,7 @@ fn unknown(path: &str) -> String {
     let parts: Vec<&str> = path.split('.').collect();
     let (first, last) =
         (parts.first().copied().unwrap_or_default(), parts.last().copied().unwrap_or_default());
-    // A key of the table that is named, or of any.
+    // Suggest a key of the same table, or of any.
     let in_table: Vec<&str> =
         names.iter().copied().filter(|name| name.split('.').next() == Some(first)).collect();
     let ends: Vec<&str> = in_table.iter().filter_map(|name| name.rsplit('.').next()).collect();
@@ -208,8 +208,8 @@ fn unknown(path: &str) -> String {
     let keys: Vec<&str> = names.iter().filter_map(|name| name.rsplit('.').next()).collect();
     let near = nearest(path, names.iter().copied()).or_else(near_end).or_else(|| meant(last, &keys));
     match near {
-        Some(near) => format!("there is no key {shown:?}: did you mean `{near}`?"),
-        None => format!("there is no key {shown:?}: `glimt explain` lists all tables"),
+        Some(near) => format!("unknown key {shown:?}; did you mean `{near}`?"),
+        None => format!("unknown key {shown:?}; `glimt explain` lists all tables"),
     }
 }
 
@@ -218,7 +218,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_key_is_found_by_its_table_its_type_or_alone() {
+    fn keys_are_found_by_any_part_of_their_path() {
         let text = explained("materials.metal.roughness").expect("a key");
         for part in ["0 … 1", "default  0.2", "number or texture", "roughness = 0.2"] {
             assert!(text.contains(part), "{part}: {text}");
@@ -236,32 +236,29 @@ mod tests {
     }
 
     #[test]
-    fn several_keys_have_two_lines_each() {
+    fn ambiguous_keys_have_two_lines_each() {
         let text = explained("radius").expect("keys");
-        assert!(
-            text.starts_with("photons.radius: number; length; 0 …; default 0.0\n    Radius of"),
-            "{text}"
-        );
+        assert!(text.starts_with("photons.radius: number; length; 0 …; default 0.0\n    Kernel"), "{text}");
         assert!(text.contains("\nsphere.radius: number; length; > 0; required\n"), "{text}");
         assert!(text.lines().count() < 20 && text.ends_with(": glimt explain photons.radius\n"), "{text}");
     }
 
     #[test]
-    fn lines_fit_the_terminal() {
+    fn lines_wrap_to_the_terminal() {
         let text = "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four five six.\n";
         let expected =
             "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four\n              five six.\n";
-        assert_eq!(fitted(text, 34), expected);
-        assert_eq!(fitted(text, 10), text, "too narrow to be broken");
+        assert_eq!(wrap_indented(text, 34), expected);
+        assert_eq!(wrap_indented(text, 10), text, "too narrow to wrap");
         for (path, _) in paths() {
-            let text = fitted(&explained(&path).unwrap_or_default(), 80);
+            let text = wrap_indented(&explained(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
         }
     }
 
     #[test]
-    fn every_path_of_the_definition_is_explained() {
+    fn every_path_is_explained() {
         for (path, doc) in paths() {
             let text = explained(&path).unwrap_or_default();
             assert!(text.contains(&plain(doc)), "{path}: {text}");
@@ -273,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_leads_to_what_is_near() {
+    fn unknown_keys_suggest_similar_ones() {
         for (wrong, near) in [
             ("render.sample", "render.samples"),
             ("sphere.raduis", "sphere.radius"),

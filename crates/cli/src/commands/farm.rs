@@ -1,4 +1,4 @@
-//! `glimt farm`: the script by which a program that people have spreads the parts of a picture over machines.
+//! `glimt farm`: prints a Slurm, GNU parallel or Kubernetes script that renders an image in parts.
 
 use std::path::Path;
 
@@ -18,18 +18,17 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     }
     let paths = [args.scene.to_str(), args.output.to_str()];
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
-    // A line of a name could end a document in the script, and a script is shown on terminals.
+    // A line break in a name could end a here-document, and scripts are shown on terminals.
     let words = words.chain([args.image.as_str(), args.claim.as_str()]);
     if paths.contains(&None) || words.into_iter().any(|word| !is_plain_word(word)) {
-        return console
-            .fail(Exit::WRONG, "a script cannot hold this name: use names of letters, digits, - and _");
+        return console.fail(Exit::WRONG, "names cannot contain control characters");
     }
     if !args.scene.is_file() {
-        return console.fail(Exit::WRONG, &format!("{}: no such file", args.scene.display()));
+        return console.fail(Exit::WRONG, &format!("file not found: {}", args.scene.display()));
     }
     let options = match check_options(args) {
         Ok(options) => options,
-        Err(message) => return console.fail(Exit::WRONG, &format!("behind `--`: {message}")),
+        Err(message) => return console.fail(Exit::WRONG, &format!("after `--`: {message}")),
     };
     console.text(&match args.engine {
         Scheduler::Slurm => slurm(args),
@@ -39,36 +38,35 @@ pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
     Exit::DONE
 }
 
-/// Whether a script can hold a word and a terminal show it.
+/// Whether a word has no control or invisible characters, so it is safe in scripts and terminals.
 fn is_plain_word(word: &str) -> bool {
     word.chars().all(is_plain)
 }
 
-/// Reads the options of every render as the renders will.
+/// Parses the options of the renders.
 ///
 /// # Errors
-/// One is unknown or wrong, or is not the same for all parts.
+/// An option is invalid, or cannot be the same for all parts.
 fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     let (program, scene) = ("glimt".to_owned(), file(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());
     let render = match Args::try_parse_from(words) {
         Ok(Args { command: None, render }) => render,
-        Ok(Args { command: Some(_), .. }) => return Err("a command is no option of a render".to_owned()),
-        Err(error) => return Err(first_words(&error)),
+        Ok(Args { command: Some(_), .. }) => {
+            return Err("expected options of a render, not a command".to_owned());
+        }
+        Err(error) => return Err(message_of(&error)),
     };
     let photons_by_error =
         render.photons == Some(Switch::On) && render.error.is_some_and(|error| error > 0.0);
     let faults = [
-        (
-            !render.outputs.is_empty(),
-            "-o names the image, in front of the `--`; each part has a name of its own",
-        ),
-        (render.shard.is_some(), "--shard is given to each part by the script"),
-        (render.once, "--once is given to each part by the script"),
-        (render.resume, "--resume is given to each part by the script"),
-        (render.report.is_some(), "--report would be one file for all parts"),
-        (render.time.is_some(), "--time has no parts: machines differ in speed"),
-        (photons_by_error, "photons with a noise threshold have no parts: each pass judges the whole image"),
+        (!render.outputs.is_empty(), "put -o before `--`; the parts are named automatically"),
+        (render.shard.is_some(), "--shard is added by the script"),
+        (render.once, "--once is added by the script"),
+        (render.resume, "--resume is added by the script"),
+        (render.report.is_some(), "--report would be the same file for all parts"),
+        (render.time.is_some(), "--shard does not work with --time"),
+        (photons_by_error, "--shard does not work with photons and --error"),
     ];
     match faults.iter().find(|(is_there, _)| *is_there) {
         Some((_, message)) => Err((*message).to_owned()),
@@ -76,7 +74,8 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     }
 }
 
-/// Returns the mebibytes that a container needs: the memory of a part plus a quarter. `None`, with a warning, if the scene cannot be read.
+/// Memory request of a container in MiB: the estimate for one part plus 25 %. Prints a warning and returns `None` if the scene
+/// cannot be read.
 fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
@@ -88,32 +87,33 @@ fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u6
             "the scene has errors".to_owned()
         }
     };
-    console.say(&format!("warning: the jobs state no memory: {why}"));
+    console.say(&format!("warning: the jobs have no memory request: {why}"));
     None
 }
 
-/// The words of an error about arguments, without the usage below them.
-fn first_words(error: &clap::Error) -> String {
+/// The message of a clap error, without the usage.
+fn message_of(error: &clap::Error) -> String {
     if !error.use_stderr() {
-        return "--help and --version are no options of a render".to_owned();
+        return "expected options of a render, not --help or --version".to_owned();
     }
     let text = error.to_string();
     let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
     lines.join(" ").trim_start_matches("error: ").to_owned()
 }
 
-/// One word for a shell, for glimt no option and no command.
+/// Quotes a word for a shell.
 fn word(text: &str) -> String {
     shlex::try_quote(text).map_or_else(|_| text.to_owned(), |quoted| quoted.into_owned())
 }
 
+/// A path that glimt takes neither for an option nor for a command.
 fn file(path: &Path) -> String {
     let text = path.to_string_lossy();
     let is_bare = text.starts_with('-') || !text.contains(['/', '.']);
     if is_bare { format!("./{text}") } else { text.into_owned() }
 }
 
-/// The call that renders one part; `index` stands for its number in a shell, outside of quotes.
+/// The command that renders one part. `index` is a shell expression for its number.
 fn render(args: &FarmArgs, index: &str) -> String {
     let (scene, part) = (word(&file(&args.scene)), part(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", word(option))).collect();
@@ -125,13 +125,13 @@ fn part(args: &FarmArgs, index: &str) -> String {
     format!("{}.{index}.part", word(&file(&args.output)))
 }
 
-/// The call that joins the parts, whose names are the words that this shell command prints.
+/// The command that merges the parts. Lists them with `seq`.
 fn merge(args: &FarmArgs, options: &str) -> String {
     let (out, count) = (word(&file(&args.output)), args.shards);
     format!("seq -f {}.%.0f.part {count} | xargs -d '\\n' glimt merge {options}{out}", word(&escaped(args)))
 }
 
-/// The output in a format of `seq`.
+/// The output path, escaped for the format of `seq`.
 fn escaped(args: &FarmArgs) -> String {
     file(&args.output).replace('%', "%%")
 }
@@ -141,8 +141,8 @@ fn slurm(args: &FarmArgs) -> String {
     format!(
         "\
 #!/bin/sh
-# Renders in {count} parts and joins them. Give this to a shell in the folder where the paths hold.
-# A job that is preempted or near its time limit saves a checkpoint, is queued again, and goes on from there.
+# Renders {count} parts and merges them. Run this in the folder that the paths are relative to.
+# A job that is preempted or reaches its time limit saves a checkpoint, is requeued and resumes.
 set -eu
 parts=$(sbatch --parsable --job-name=glimt --array=1-{count} --requeue --signal=B:USR1@60 <<'JOB'
 #!/bin/sh
@@ -164,7 +164,7 @@ echo \"parts: job $parts; merge: job $merge\"
 
 fn parallel(args: &FarmArgs) -> String {
     let (count, merge) = (args.shards, merge(args, ""));
-    // Each line that parallel reads is a command: in a template it would take parts of names for its own.
+    // Pass one command per line: in a template, parallel would expand parts of names.
     let index = "\u{0}";
     let render: Vec<String> = render(args, index).split(index).map(word).collect();
     let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
@@ -173,8 +173,8 @@ fn parallel(args: &FarmArgs) -> String {
     format!(
         "\
 #!/bin/sh
-# Renders in {count} parts, one at a time on each machine, and joins them. A part that is killed is tried again. Called again,
-# the script goes on where it was: finished parts stay, and glimt refuses to replace those of another scene or other options.
+# Renders {count} parts, one at a time on each machine, and merges them. Killed parts are retried. If the script is run again,
+# it continues: finished parts are kept, and glimt refuses to replace parts of another scene or with other options.
 set -eu
 seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
     parallel --jobs 1 --retries 3 --halt soon,fail=1{way}{hosts}
@@ -222,18 +222,18 @@ spec:
     };
     let indexed = format!("  completions: {count}\n  parallelism: {count}\n  completionMode: Indexed\n");
     format!(
-        "# Renders in {count} parts and joins them: kubectl apply -f -\n{}---\n{}",
+        "# Renders {count} parts and merges them: kubectl apply -f -\n{}---\n{}",
         job("glimt", &indexed, &render),
         job("glimt-merge", "", &command(&merge))
     )
 }
 
-/// A command of a container. Kubernetes puts variables in the place of `$(NAME)`, and `$` in that of `$$`.
+/// A container command. Escapes `$`, as Kubernetes expands `$(NAME)` and `$$`.
 fn command(text: &str) -> String {
     yaml(&text.replace('$', "$$"))
 }
 
-/// A text as YAML holds it: a string of JSON is one.
+/// Quotes a string for YAML, which includes JSON strings.
 fn yaml(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn words_with_control_characters_are_refused() {
+    fn control_characters_are_rejected() {
         for word in ["a\nb", "\0", "\u{1b}]52;c;eA==\u{7}", "\u{9b}31m", "\u{202e}gnp.exr", "a\tb", "\r"] {
             assert!(!is_plain_word(word), "{word:?}");
         }
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_words_of_a_shell() {
+    fn names_are_quoted_for_the_shell() {
         let args = args("'my scene.toml' -o \"it's 5% $HOME.exr\" --shards 3 --engine slurm -- --samples 8");
         let call = render(&args, "1");
         let words = shlex::split(&call).expect("words");
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn parallel_reads_whole_commands() {
+    fn parallel_does_not_expand_names() {
         let name = "{= `touch pwned` =}{}{1} it's.toml";
         let args = args(&format!("{} -o 'a {{}}.exr' --shards 2 --engine parallel", word(name)));
         let script = parallel(&args);
@@ -288,21 +288,21 @@ mod tests {
     }
 
     #[test]
-    fn options_are_those_of_a_render_and_the_same_for_all_parts() {
+    fn only_options_valid_for_all_parts_are_accepted() {
         let said = |options: &str| {
             let args = args(&format!("a.toml -o a.exr --shards 2 --engine slurm -- {options}"));
             check_options(&args).err().unwrap_or_default()
         };
         for (options, words) in [
-            ("-o x.png", "-o names the image"),
-            ("--shard 1/3", "--shard is given"),
-            ("--once", "--once is given"),
-            ("--resume", "--resume is given"),
-            ("--report r.json", "one file for all parts"),
-            ("--time 3", "--time has no parts"),
-            ("--photons on --error 0.1", "photons with a noise threshold"),
-            ("--sample 3", "unexpected argument '--sample'"),
-            ("--samples 0", "invalid value '0'"),
+            ("-o x.png", "-o "),
+            ("--shard 1/3", "--shard"),
+            ("--once", "--once"),
+            ("--resume", "--resume"),
+            ("--report r.json", "--report"),
+            ("--time 3", "--time"),
+            ("--photons on --error 0.1", "--error"),
+            ("--sample 3", "'--sample'"),
+            ("--samples 0", "'0'"),
             ("--samples 3 --samples 4", "--samples"),
             ("another.toml", "another.toml"),
             ("check b.toml", ""),
@@ -318,7 +318,7 @@ mod tests {
         }
     }
 
-    /// A command as Kubernetes hands it on: `$(NAME)` is the variable of that name, if there is one; `$$` is `$`
+    /// Expands a command as Kubernetes does: `$(NAME)` is a variable if it exists, and `$$` is `$`
     /// (k8s.io/kubernetes/third_party/forked/golang/expansion).
     fn expanded(text: &str, variables: &[(&str, &str)]) -> String {
         let (mut out, mut rest) = (String::new(), text);
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn names_survive_kubernetes_and_its_shell() {
+    fn names_survive_kubernetes_and_the_shell() {
         let (scene, picture) = ("$(HOME) $$ $$(HOME).toml", "o $$ $(JOB_COMPLETION_INDEX).exr");
         let args = args(&format!("{} -o {} --shards 8 --engine kubernetes", word(scene), word(picture)));
         let script = kubernetes(&args, None);
@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_of_kubernetes_is_yaml_with_strings_of_json() {
+    fn kubernetes_jobs_are_yaml_with_json_strings() {
         let args = args("a.toml -o 'a \"b\".exr' --shards 8 --engine kubernetes");
         let bare = kubernetes(&args, None);
         let script = kubernetes(&args, Some(640));

@@ -1,4 +1,4 @@
-//! `glimt import`: a scene of a file of another program.
+//! `glimt import`: converts a glTF file to a scene.
 
 use std::path::{Path, PathBuf};
 
@@ -20,32 +20,30 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
         Ok(ended) => ended,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
-    let exit = make(args, console, &token);
+    let exit = convert(args, console, &token);
     let Some(number) = ended.by() else { return exit };
     if let Some(signal) = signals::name(number).filter(|_| exit != Exit::DONE) {
-        console.say(&format!("ended by {signal}: nothing was written"));
+        console.say(&format!("terminated by {signal}: nothing was written"));
     }
     Exit::signal(number)
 }
 
-/// Makes the scene. Once the token is cancelled, a failure says nothing.
-fn make(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
+/// Converts the file. Reports no error if the token is cancelled.
+fn convert(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     let scene = match &args.output {
         Some(output) => output.clone(),
         None => PathBuf::from(args.file.with_extension("toml").file_name().unwrap_or_default()),
     };
     let Some(name) = scene.file_stem().filter(|_| has_ending(&scene)) else {
         let shown = scene.display();
-        return console.fail(Exit::WRONG, &format!("{shown} is no name of a scene: it must end in .toml"));
+        return console.fail(Exit::WRONG, &format!("{shown} is not a scene file name: it must end in .toml"));
     };
-    // Files that are there stay: look before the work.
+    // Never overwrite files, so check before converting.
     let folder = format!("{}_files", name.to_string_lossy());
     let beside = scene.with_file_name(&folder);
     if let Some(there) = [&scene, &beside].into_iter().find(|path| path.symlink_metadata().is_ok()) {
-        return console.fail(
-            Exit::WRONG,
-            &format!("{} exists already, and is left as it is; name another scene with -o", there.display()),
-        );
+        return console
+            .fail(Exit::WRONG, &format!("{} already exists; choose another scene with -o", there.display()));
     }
     let imported = match import(&args.file, &folder, token) {
         Ok(imported) => imported,
@@ -53,15 +51,15 @@ fn make(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
         Err(ImportError::File(message)) => return console.fail(Exit::WRONG, &message),
         Err(ImportError::Work(message)) => return console.fail(Exit::FAILED, &message),
     };
-    tell_notes(&args.file, &imported.notes, console);
+    report_approximations(&args.file, &imported.notes, console);
     if args.strict && !imported.notes.is_empty() {
         let what = count(imported.notes.len() as u64, "approximation");
-        return console.fail(Exit::FAILED, &format!("{what} with --strict: nothing is written"));
+        return console.fail(Exit::FAILED, &format!("{what} with --strict: nothing was written"));
     }
     match write_all(&scene, &imported, token) {
         Ok(()) => {
             let files = count(imported.files.len() as u64, "file");
-            console.say(&format!("wrote {}, and {files} in {}", scene.display(), beside.display()));
+            console.say(&format!("wrote {} and {files} in {}", scene.display(), beside.display()));
             Exit::DONE
         }
         Err(OutputError::Cancelled(_)) => Exit::FAILED,
@@ -69,13 +67,13 @@ fn make(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     }
 }
 
-/// Whether a scene would be found by its name.
+/// Whether a path has the extension of a scene.
 fn has_ending(scene: &Path) -> bool {
     scene.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
-/// Names each approximation, then counts them.
-fn tell_notes(file: &Path, notes: &[String], console: &Console) {
+/// Prints each approximation and their number.
+fn report_approximations(file: &Path, notes: &[String], console: &Console) {
     let warning = |note: &String| Diagnostic {
         severity: Severity::Warning,
         message: note.clone(),
@@ -85,11 +83,11 @@ fn tell_notes(file: &Path, notes: &[String], console: &Console) {
     };
     console.diagnostics(&notes.iter().map(warning).collect::<Vec<_>>());
     if !notes.is_empty() {
-        console.say(&format!("{} in all", count(notes.len() as u64, "approximation")));
+        console.say(&format!("{} in total", count(notes.len() as u64, "approximation")));
     }
 }
 
-/// Writes the other files and the scene: all of them or none, the scene last.
+/// Writes all files or none, the scene last.
 fn write_all(scene: &Path, imported: &Imported, token: &CancelToken) -> Result<(), OutputError> {
     let name = PathBuf::from(scene.file_name().unwrap_or_default());
     let others = imported.files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()));

@@ -1,4 +1,4 @@
-//! `glimt info`: how a picture was made.
+//! `glimt info`: shows how an image was rendered.
 
 use std::path::Path;
 
@@ -28,7 +28,7 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     if made.is_own() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// Refuses a file in place of a scene that is an image, a part or a checkpoint, and says how it was made. `None` for other files.
+/// If the file is an image, part or checkpoint instead of a scene, reports that and how it was rendered. `None` for other files.
 pub(crate) fn instead_of_scene(path: &Path, console: &Console) -> Option<Exit> {
     let problem = other_content(path)?;
     console.diagnostics(&[*problem]);
@@ -54,24 +54,24 @@ fn as_json(path: &Path, made: &Made) -> Value {
     })
 }
 
-/// Most columns of the names of settings; longer names move their values to the right.
-const MOST_WIDTH: usize = 40;
+/// Most columns of the name column. Longer names move their values to the right.
+const MAX_NAME_COLUMNS: usize = 40;
 
-/// A line about the file, then one for each setting.
+/// A line about the file, followed by one for each setting.
 fn as_text(path: &Path, made: &Made) -> String {
     let name = path.to_string_lossy();
     let size = made.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
     let frames = made.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
     let mut text = format!("{}: {}{size}{frames}\n", visible(&name), made.format);
-    let program = made.program.as_deref().unwrap_or("unknown: the file does not tell");
+    let program = made.program.as_deref().unwrap_or("unknown (not stored in the file)");
     let mut lines = vec![("program", program)];
     lines.extend(made.settings.iter().map(|(name, value)| (name.as_str(), value.as_str())));
     let channels = made.channels.join(" ");
     if !channels.is_empty() {
         lines.push(("channels", &channels));
     }
-    // A name may be as long as its file; formats take no widths above 65,535.
-    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MOST_WIDTH);
+    // Limit the width: names may be as long as the file, and format widths end at 65,535.
+    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MAX_NAME_COLUMNS);
     for (name, value) in lines {
         text += &format!("  {:width$}  {}\n", visible(name), visible(value));
     }
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_setting_with_an_endless_name_is_shown() {
+    fn very_long_names_are_shown() {
         for length in [39, 41, 65_535, 65_536, 200_000] {
             let name = "n".repeat(length);
             let made = Made { settings: vec![(name.clone(), "value".to_owned())], ..Made::default() };

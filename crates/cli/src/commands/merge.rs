@@ -1,4 +1,4 @@
-//! `glimt merge`: parts to a picture.
+//! `glimt merge`: merges parts to an image.
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -20,12 +20,12 @@ use crate::output::write::{Guard, atomic_until};
 use crate::output::{self, Finish, Format, Losses, OutputError, is_one_file, scene_path};
 use crate::progress::{json_line, style};
 use crate::scene::sanitize::{shortened, visible};
-use crate::signals::{self, Ended};
+use crate::signals;
 use crate::system::threads::start_failure;
 use crate::tui::{NamedImage, images_as_text};
 
-/// Between two looks for parts that arrive.
-const PAUSE: Duration = Duration::from_millis(500);
+/// Interval for checking for new parts.
+const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
     let pool = match ThreadPoolBuilder::new().build() {
@@ -39,17 +39,17 @@ pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
     let exit = Merge { args, console, token: &token, pool: &pool }.run();
-    ended.by().map_or(exit, |number| say_end(&ended, number, console))
+    ended.by().map_or(exit, |number| report_signal(number, console))
 }
 
-fn say_end(_ended: &Ended, number: i32, console: &Console) -> Exit {
+fn report_signal(number: i32, console: &Console) -> Exit {
     if let Some(signal) = signals::name(number) {
-        console.say(&format!("ended by {signal}: nothing was written"));
+        console.say(&format!("terminated by {signal}: nothing was written"));
     }
     Exit::signal(number)
 }
 
-/// One call.
+/// A call of `merge`.
 struct Merge<'a> {
     args: &'a MergeArgs,
     console: &'a Console,
@@ -68,25 +68,23 @@ impl Merge<'_> {
         self.check_inputs(&parts)?;
         let merged = self.merged(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
-            return Err(self.console.fail(Exit::WRONG, "the parts do not say how their picture is finished"));
+            return Err(self.console.fail(Exit::WRONG, "the parts have no output settings"));
         };
         self.write(format, finish, &merged, &parts)?;
         self.say_missing(&merged);
         Ok(Exit::DONE)
     }
 
-    /// Checks before the work that the output can be written, and is none of the parts.
+    /// Checks that the output can be written and is not one of the parts.
     fn check_output(&self) -> Result<Format, Exit> {
         let out = &self.args.out;
         let name = out.display();
         if part::is_part(out) {
-            let message =
-                format!("cannot write {name}: it is a part; name the picture first, then the parts");
+            let message = format!("cannot write {name}: it is a part; put the output before the parts");
             return Err(self.console.fail(Exit::WRONG, &message));
         }
         if self.args.parts.iter().any(|part| is_one_file(part, out)) {
-            let message =
-                format!("{name} is the picture to write, and is given again as a part: name it once");
+            let message = format!("{name} is given both as the output and as a part");
             return Err(self.console.fail(Exit::WRONG, &message));
         }
         let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
@@ -94,7 +92,7 @@ impl Merge<'_> {
         Ok(format)
     }
 
-    /// Checks before the work that the picture does not take the place of a file that it was made of.
+    /// Checks that the output does not replace an input of the render.
     fn check_inputs(&self, parts: &[PartFile]) -> Result<(), Exit> {
         match self.refused_input(parts, &self.args.out) {
             Some(message) => Err(self.console.fail(Exit::WRONG, &message)),
@@ -102,20 +100,20 @@ impl Merge<'_> {
         }
     }
 
-    /// Why the picture must not be written to a file: the parts were made of it. `None` if they were not.
+    /// An error message if the parts were rendered from the file at `path`.
     fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
         let by_content = || part::input_in_place_of(parts, path).map(|name| (name, "it"));
-        let by_name = || part::input_of_that_name(parts, path).map(|name| (name, "a file of that name"));
+        let by_name = || part::input_of_that_name(parts, path).map(|name| (name, "a file of this name"));
         let (name, what) = by_content().or_else(by_name)?;
         let out = self.args.out.display();
         Some(format!(
-            "cannot write {out}: the parts were rendered from {what} ({name}); choose another name for the picture"
+            "cannot write {out}: the parts were rendered from {what} ({name}); choose another output"
         ))
     }
 
-    /// Opens all parts; every one that is wrong is named.
+    /// Opens all parts and reports every invalid one.
     fn opened(&self) -> Result<Vec<PartFile>, Exit> {
-        let mut bar = Bar::new(self.args.progress, self.console, "read");
+        let mut bar = StepProgress::new(self.args.progress, self.console, "read");
         let (mut parts, mut wrong) = (Vec::new(), Vec::new());
         for (index, path) in self.args.parts.iter().enumerate() {
             match PartFile::open(path, self.token) {
@@ -135,21 +133,21 @@ impl Merge<'_> {
         wrong.iter().for_each(|error| self.console.say(&format!("error: {error}")));
         match (wrong.is_empty(), parts.is_empty()) {
             (false, _) => Err(Exit::WRONG),
-            (true, true) => Err(self.console.fail(Exit::WRONG, "none of the parts is there")),
+            (true, true) => Err(self.console.fail(Exit::WRONG, "none of the parts exist")),
             (true, false) => Ok(parts),
         }
     }
 
-    /// Every further part would fail for the same reason.
+    /// Reports that the limit on open files is reached. Opening further parts would fail for the same reason.
     fn too_many_files(&self, opened: usize) -> Exit {
         let all = self.args.parts.len();
         let message = format!(
-            "too many open files: {opened} of {all} parts could be opened; raise the limit on open files (ulimit -n)"
+            "too many open files: only {opened} of {all} parts could be opened; raise the limit (ulimit -n)"
         );
         self.console.fail(Exit::FAILED, &message)
     }
 
-    /// Waits until all parts are there and whole, and shows what is there.
+    /// Waits until all parts are complete, showing the image so far.
     fn watched(&self) -> Result<Vec<PartFile>, Exit> {
         let mut parts: Vec<PartFile> = Vec::new();
         let mut waiting: Vec<Awaited> = self.args.parts.iter().cloned().map(Awaited::new).collect();
@@ -176,7 +174,7 @@ impl Merge<'_> {
                 if self.has_block() {
                     self.redraw(&parts, &words, &mut block)?;
                 } else if is_new {
-                    // Name parts that do not fit as soon as they appear.
+                    // Report mismatched parts as soon as they appear.
                     part::check(&parts).map_err(|error| self.refuse(&error))?;
                 }
                 self.say_parts(parts.len(), &unfinished, &words);
@@ -190,7 +188,7 @@ impl Merge<'_> {
     }
 
     fn pause(&self) -> Result<(), Exit> {
-        let end = Instant::now() + PAUSE;
+        let end = Instant::now() + POLL_INTERVAL;
         while Instant::now() < end {
             if self.token.is_cancelled() {
                 return Err(Exit::FAILED);
@@ -200,18 +198,18 @@ impl Merge<'_> {
         Ok(())
     }
 
-    /// The number of parts that exist, and the names of the unfinished ones.
+    /// Describes the number of complete parts and the names of incomplete ones.
     fn parts_words(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
-        let not_whole = match names.as_slice() {
+        let incomplete = match names.as_slice() {
             [] => String::new(),
-            [name] => format!("; {name} is not whole yet"),
-            names => format!("; {} are not whole yet", names.join(", ")),
+            [name] => format!("; {name} is incomplete"),
+            names => format!("; {} are incomplete", names.join(", ")),
         };
-        format!("{count} of {} parts{not_whole}", self.args.parts.len())
+        format!("{count} of {} parts{incomplete}", self.args.parts.len())
     }
 
-    /// Reports the parts on stderr, unless the image on the same terminal has these words.
+    /// Reports the parts on stderr, unless the image on the same terminal shows the same text.
     fn say_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
             Progress::None => {}
@@ -225,7 +223,7 @@ impl Merge<'_> {
         }
     }
 
-    /// Whether the image is redrawn in place: on a terminal, if no lines of progress come in between.
+    /// Whether the image is redrawn in place: on a terminal without lines of progress in between.
     fn has_block(&self) -> bool {
         let has_lines = match self.args.progress {
             Progress::Plain | Progress::Json => self.console.is_terminal,
@@ -234,7 +232,7 @@ impl Merge<'_> {
         std::io::stdout().is_terminal() && !has_lines
     }
 
-    /// Shows the image of these parts in place of the last one, with words above it.
+    /// Redraws the image of these parts, with a text above it.
     fn redraw(&self, parts: &[PartFile], words: &str, block: &mut Block) -> Result<(), Exit> {
         let words = visible(words);
         let columns = answer_columns();
@@ -260,7 +258,7 @@ impl Merge<'_> {
     }
 
     fn merged(&self, parts: &[PartFile], is_partial: bool, what: &'static str) -> Result<Merged, Exit> {
-        let mut bar = Bar::new(self.args.progress, self.console, what);
+        let mut bar = StepProgress::new(self.args.progress, self.console, what);
         let tell = |tile: usize, film: &Film| bar.at(tile, film.tile_count());
         let merged = part::merge(parts, is_partial, self.token, tell);
         bar.end();
@@ -319,13 +317,13 @@ impl Merge<'_> {
     fn say_missing(&self, merged: &Merged) {
         if !merged.missing.is_empty() {
             let missing = part::missing_parts(&merged.missing, merged.count);
-            self.console.say(&format!("warning: {missing}; the picture is made of the others"));
+            self.console.say(&format!("warning: {missing}; merged the others"));
         }
     }
 }
 
-/// Records the scene's path as a single render does: relative to the image. Looks for the scene where the parts say it is, then beside
-/// the image.
+/// Records the scene's path relative to the output, as a single render does. Looks for the scene next to the parts, then next to the
+/// output.
 fn name_scene(finish: &mut Finish, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());
@@ -336,10 +334,10 @@ fn name_scene(finish: &mut Finish, parts: &[PartFile], out: &Path) {
     }
 }
 
-/// A part that is waited for.
+/// A part that is not complete yet.
 struct Awaited {
     path: PathBuf,
-    /// Length and time of the file when it was found to end too early. `None` if it was not there yet.
+    /// Length and modification time of the incomplete file. `None` if it does not exist.
     unfinished: Option<(u64, Option<SystemTime>)>,
 }
 
@@ -348,13 +346,13 @@ impl Awaited {
         Self { path, unfinished: None }
     }
 
-    /// Opens the part. `None` if it is not there, or not whole yet.
+    /// Opens the part. `None` if it is missing or incomplete.
     ///
     /// # Errors
-    /// Those of opening it.
+    /// The part is invalid.
     fn look(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
         let now = std::fs::metadata(&self.path).ok().map(|found| (found.len(), found.modified().ok()));
-        // One that has not grown is not read again.
+        // Do not read an unchanged file again.
         if now.is_none() || now == self.unfinished {
             self.unfinished = now;
             return Ok(None);
@@ -373,21 +371,21 @@ impl Awaited {
         }
     }
 
-    /// Its name, if it is there and not whole.
+    /// Its path, if it exists but is incomplete.
     fn unfinished(&self) -> Option<&Path> {
         self.unfinished.is_some().then_some(&self.path)
     }
 }
 
-/// Progress of one step of the work.
-struct Bar {
+/// Progress of one step.
+struct StepProgress {
     what: &'static str,
     bar: Option<ProgressBar>,
     is_json: bool,
     said: usize,
 }
 
-impl Bar {
+impl StepProgress {
     fn new(progress: Progress, console: &Console, what: &'static str) -> Self {
         let template = "  {wide_bar} {percent:>3}% {msg}";
         let has_bar = progress == Progress::Auto && console.is_terminal;
@@ -396,7 +394,7 @@ impl Bar {
     }
 
     fn at(&mut self, done: usize, total: usize) {
-        /// Most steps to report.
+        /// Number of reports.
         const STEPS: usize = 100;
         let step = done * STEPS / total.max(1);
         if step == self.said {

@@ -1,4 +1,4 @@
-//! `glimt new`: a scene to start from, as a file or on stdout.
+//! `glimt new`: writes a scene to start from, to a file or stdout.
 
 use std::borrow::Cow;
 use std::io::ErrorKind;
@@ -17,9 +17,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if file == Path::new("-") {
         if with_schema {
             let name = schema::FILE;
-            console.say(&format!(
-                "note: {name} is not written: glimt schema > {name} writes it beside the scene"
-            ));
+            console.say(&format!("note: write {name} next to the scene with: glimt schema > {name}"));
         }
         console.text(&text);
         return Exit::DONE;
@@ -27,7 +25,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if let Some(message) = misnamed(file) {
         return console.fail(Exit::WRONG, &message);
     }
-    // A scene that is refused leaves no schema behind.
+    // Do not write the schema if the scene cannot be written.
     let is_free = file.symlink_metadata().is_err();
     let schema = file.with_file_name(schema::FILE);
     if with_schema && is_free {
@@ -42,20 +40,19 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         Ok(()) => {
             console.say(&format!("wrote {name}"));
             if let Some(file) = quoted(file) {
-                console.say(&format!(
-                    "now: glimt {file}    (see it, edit it, save it, see it again; ? for help)"
-                ));
+                console
+                    .say(&format!("now: glimt {file}    (edit and save it to update the image; ? for help)"));
             }
             Exit::DONE
         }
         Err(error) if error.kind() == ErrorKind::AlreadyExists || file.is_dir() => {
             let dangles = !file.exists();
             let what =
-                if dangles { "is a symbolic link to a file that does not exist" } else { "exists already" };
-            console.fail(Exit::WRONG, &format!("{name} {what}, and is left as it is"))
+                if dangles { "is a symbolic link to a file that does not exist" } else { "already exists" };
+            console.fail(Exit::WRONG, &format!("{name} {what}"))
         }
         Err(source) => {
-            // Whoever can say more of the place comes first.
+            // Prefer a more specific error about the folder.
             let of_place = output::check_place(file).err();
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.fail(Exit::FAILED, &error.to_string())
@@ -63,10 +60,10 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     }
 }
 
-/// Writes the schema beside a scene; returns whether it was not there. One that is there already will do if it is the same.
+/// Writes the schema next to a scene. Returns whether it was written: an identical file is kept.
 ///
 /// # Errors
-/// Another file of that name, or no way to write one.
+/// A different file has this name, or the file cannot be written.
 fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     let text = schema::text(Draft::Four);
     match write::new_file(path, text.as_bytes()) {
@@ -77,9 +74,7 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
                 let name = path.display();
                 Err((
                     Exit::WRONG,
-                    format!(
-                        "{name} is not the schema of this glimt, and is left as it is: remove it, or leave out --schema"
-                    ),
+                    format!("{name} differs from the schema of this version: remove it, or omit --schema"),
                 ))
             }
         },
@@ -87,25 +82,25 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     }
 }
 
-/// Message about a name of a picture or a mesh: nobody would find the scene there, and a render writes pictures.
+/// Message about a scene file with the extension of an image or a mesh.
 fn misnamed(file: &Path) -> Option<String> {
     let what = if is_mesh(file) {
         "a mesh"
-    } else if is_picture(file) {
-        "a picture"
+    } else if is_image(file) {
+        "an image"
     } else {
         return None;
     };
     let command = quoted(&file.with_extension("toml")).map(|scene| format!(": glimt new {scene}"));
     Some(format!(
-        "{} is the name of {what}; scenes end in .toml{}",
+        "{} has the extension of {what}; use .toml for scenes{}",
         file.display(),
         command.unwrap_or_default()
     ))
 }
 
-/// A file as a shell takes it for one word, and glimt for no option and no command. `None` if a terminal does not show the name as
-/// it is.
+/// Quotes a file for a shell, so that glimt takes it neither for an option nor for a command. `None` if a terminal cannot show
+/// the name.
 fn quoted(file: &Path) -> Option<String> {
     let name = file.to_str().filter(|name| visible(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
@@ -113,8 +108,8 @@ fn quoted(file: &Path) -> Option<String> {
     shlex::try_quote(&name).ok().map(Cow::into_owned)
 }
 
-/// Whether a name is that of a picture, of a format that glimt writes.
-fn is_picture(file: &Path) -> bool {
+/// Whether a file has the extension of an image.
+fn is_image(file: &Path) -> bool {
     Format::of(file).is_ok()
 }
 
@@ -123,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_one_word_for_a_shell() {
+    fn names_are_quoted_for_the_shell() {
         for name in
             ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
         {

@@ -1,4 +1,4 @@
-//! Bars on a terminal: the stage at work, one bar for each asset that is loading, one for the render.
+//! Progress bars on a terminal: the current stage, a bar for each asset being loaded, and a bar for the render.
 
 use std::collections::HashMap;
 
@@ -9,11 +9,11 @@ use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, Sta
 use crate::pipeline::words::Eta;
 use crate::scene::sanitize::visible;
 
-/// Columns that the bar keeps at least.
-const LEAST_BAR: usize = 10;
-/// Columns where the size is not known.
-const PLAIN_COLUMNS: usize = 80;
-/// Steps of the render's bar.
+/// Least width of the bar.
+const MIN_BAR_COLUMNS: usize = 10;
+/// Assumed width of a terminal of unknown size.
+const DEFAULT_COLUMNS: usize = 80;
+/// Resolution of the render's bar.
 const STEPS: u64 = 1000;
 
 pub(super) struct Bars {
@@ -21,7 +21,7 @@ pub(super) struct Bars {
     stage: ProgressBar,
     assets: HashMap<String, ProgressBar>,
     render: Option<ProgressBar>,
-    /// The seconds after which the render ends, if the call says so.
+    /// The time limit of the render in seconds.
     time: Option<f64>,
 }
 
@@ -60,8 +60,9 @@ impl Bars {
         let bar = self.render.get_or_insert_with(|| {
             all.add(ProgressBar::new(STEPS).with_style(style("  {wide_bar} {percent:>3}% {msg}")))
         });
-        // Each time anew: the terminal may have another size.
-        let columns = crossterm::terminal::size().map_or(PLAIN_COLUMNS, |(columns, _)| usize::from(columns));
+        // Query the size every time, as the terminal may be resized.
+        let columns =
+            crossterm::terminal::size().map_or(DEFAULT_COLUMNS, |(columns, _)| usize::from(columns));
         bar.set_position((progress.fraction * STEPS as f64) as u64);
         bar.set_message(words(progress, self.time, columns));
     }
@@ -84,12 +85,12 @@ impl Reporter for Bars {
             bar.finish_and_clear();
         }
         self.stage.finish_and_clear();
-        // What cannot be cleared stays.
+        // Ignore errors: the output then stays.
         let _ = self.all.clear();
     }
 }
 
-/// Words beside the bar: as many as leave it [`LEAST_BAR`] columns. Under a time limit they count seconds.
+/// The text next to the bar, as detailed as the width allows. Shows seconds instead of samples with a time limit.
 fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
         Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),
@@ -100,12 +101,12 @@ fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String
         (Some(left), None) => format!("{done}, {left}"),
         (_, _) => done.clone(),
     };
-    let room = columns.saturating_sub(LEAST_BAR + "   100% ".len());
+    let room = columns.saturating_sub(MIN_BAR_COLUMNS + "   100% ".len());
     let shorter = [Some(whole), left, Some(done)].into_iter().flatten();
     shorter.into_iter().find(|words| words.chars().count() <= room).unwrap_or_default()
 }
 
-/// A style by its template; should it not be understood, the library's own.
+/// Creates a style from a template. Falls back to the library's default.
 pub(crate) fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
@@ -129,18 +130,21 @@ mod tests {
     }
 
     #[test]
-    fn a_narrow_terminal_keeps_its_bar() {
+    fn narrow_terminals_keep_the_bar() {
         let progress = progress();
         assert_eq!(words(&progress, None, 80), "1000 of 4096 samples, 7.50 s left");
         for columns in 0..200 {
             let said = words(&progress, None, columns).chars().count();
-            assert!(said == 0 || columns >= said + "  ".len() + LEAST_BAR + " 100% ".len(), "{columns}");
+            assert!(
+                said == 0 || columns >= said + "  ".len() + MIN_BAR_COLUMNS + " 100% ".len(),
+                "{columns}"
+            );
         }
         assert_eq!(words(&progress, None, 30), "7.50 s left");
     }
 
     #[test]
-    fn under_a_time_limit_seconds_are_counted() {
+    fn time_limits_are_shown_in_seconds() {
         for columns in [80, 40] {
             assert_eq!(words(&progress(), Some(10.0), columns), "2.50 s of 10.0 s");
         }

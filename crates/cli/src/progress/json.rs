@@ -1,4 +1,4 @@
-//! One JSON object a line. Its first key, `event`, says which other keys there are:
+//! One JSON object per line. Its first key, `event`, determines the other keys:
 //!
 //! | event | keys |
 //! | --- | --- |
@@ -7,7 +7,7 @@
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
 //! | `written` | `path`, `bytes` |
 //! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `set_aside`), `path`, `message`, `samples`, or null |
-//! | `write_failed` | `message`: the report, or one of several pictures, could not be written |
+//! | `write_failed` | `message`: the report or one of several images could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
 //! | `cancelled` | |
@@ -44,14 +44,14 @@ impl Reporter for Json {
     }
 }
 
-/// A line on stderr; nothing can be done where nobody reads it.
+/// Prints a JSON line to stderr, ignoring errors.
 pub(crate) fn line(value: &Value) {
     if let Ok(text) = with_event_first(value) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
 }
 
-/// The object in a line. Its other keys are sorted.
+/// Formats an object on one line, starting with `event`. The other keys are sorted.
 fn with_event_first(value: &Value) -> serde_json::Result<String> {
     let mut rest = value.clone();
     let Some(event) = rest.as_object_mut().and_then(|keys| keys.remove("event")) else {
@@ -97,7 +97,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::Warnings { .. }
         | Event::Settings { .. }
         | Event::Preview { .. }
-        // Among the diagnostics at the end.
+        // Reported with the diagnostics at the end.
         | Event::NotKept { .. }
         | Event::Refused { .. }
         | Event::OwnImage { .. }
@@ -137,7 +137,7 @@ fn failed(failure: &Failure) -> Value {
     }
 }
 
-/// Diagnostics as in `check --json`; `path` is `file`, or null without one.
+/// Diagnostics as in `check --json`, with the additional key `path`: `file`, or null if empty.
 fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
     let mut places = Locator::default();
     let with_path = |one: &Diagnostic| {
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_event_comes_first() {
+    fn event_is_the_first_key() {
         let value = json!({ "a": 1, "event": "stage", "z": [2] });
         assert_eq!(with_event_first(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
         assert_eq!(
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_diagnostic_has_the_keys_of_check_and_its_own() {
+    fn diagnostics_have_the_keys_of_check() {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
         let outcome = crate::scene::parse(text.into(), std::path::Path::new("a.toml"));
         let failed = failed(&Failure::Scene(outcome.diagnostics));

@@ -1,4 +1,4 @@
-//! Lines now and then, for logs.
+//! Occasional lines, for logs.
 
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -8,27 +8,33 @@ use crate::console::Console;
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
 use crate::pipeline::words::Eta;
 
-/// Longest silence of a render.
+/// Longest time between lines of a render.
 const INTERVAL: Duration = Duration::from_secs(5);
-/// Lines of a whole render, beside those after a long silence.
+/// Lines per render, in addition to those after [`INTERVAL`].
 const STEPS: f64 = 10.0;
 
 pub(super) struct Plain {
     console: Console,
-    /// Steps of the render that were reported.
-    said: f64,
+    /// Steps of the render reported so far.
+    reported: f64,
     last: Instant,
     last_line: String,
-    /// Names of the assets that were reported as loaded.
+    /// Names of the assets reported as loaded.
     loaded: HashSet<String>,
 }
 
 impl Plain {
     pub(super) fn new(console: Console) -> Self {
-        Self { console, said: 0.0, last: Instant::now(), last_line: String::new(), loaded: HashSet::new() }
+        Self {
+            console,
+            reported: 0.0,
+            last: Instant::now(),
+            last_line: String::new(),
+            loaded: HashSet::new(),
+        }
     }
 
-    /// Whether an asset is loaded, for the first time: a file of several meshes is loaded once for each of them.
+    /// Whether an asset has been loaded for the first time. A file with several meshes is loaded once per mesh.
     fn is_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
         progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
@@ -39,13 +45,13 @@ impl Plain {
         }
     }
 
-    /// The line to say now, never one twice.
+    /// The line to print now, if one is due. Never repeats the last line.
     fn due(&mut self, progress: &RenderProgress) -> Option<String> {
         let step = (progress.fraction * STEPS).floor();
-        if progress.fraction >= 1.0 || (step <= self.said && self.last.elapsed() < INTERVAL) {
+        if progress.fraction >= 1.0 || (step <= self.reported && self.last.elapsed() < INTERVAL) {
             return None;
         }
-        (self.said, self.last) = (step, Instant::now());
+        (self.reported, self.last) = (step, Instant::now());
         let line = line(progress);
         if line == self.last_line {
             return None;
@@ -76,7 +82,7 @@ fn line(progress: &RenderProgress) -> String {
     format!("{:<8} {:3.0}% ({}{eta})", "render", (progress.fraction * 100.0).floor(), samples(progress))
 }
 
-/// `parse    done    0.40 ms`
+/// Describes a finished stage: `parse    done    0.40 ms`.
 pub(super) fn stage_line(stage: &StageReport) -> String {
     let status = match stage.status {
         Status::Running => "running",
@@ -93,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_line_is_said_twice() {
+    fn lines_are_not_repeated() {
         let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
         let progress = |fraction, samples| RenderProgress {
             fraction,
@@ -108,13 +114,13 @@ mod tests {
         };
         let mut said = Vec::new();
         for samples in 0..100 {
-            // Each comes twice, as a pass ends and as the next begins.
+            // Each value is reported twice, at the end of a pass and at the start of the next.
             said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
             said.extend(plain.due(&progress(f64::from(samples) / 100.0, samples)));
         }
         let tens: Vec<_> = (1..10).map(|ten| line(&progress(f64::from(ten) / 10.0, 10 * ten))).collect();
         assert_eq!(said, tens);
-        // After a long silence, and nothing new.
+        // The interval has passed, but nothing has changed.
         plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
         assert_eq!(plain.due(&progress(0.9, 90)), None);
         plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
@@ -122,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_several_meshes_is_loaded_once() {
+    fn files_with_several_meshes_are_listed_once() {
         let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
         let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
         let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
@@ -130,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_says_how_far_and_how_long() {
+    fn lines_have_progress_and_time_left() {
         let progress = RenderProgress {
             fraction: 0.4,
             elapsed_seconds: 1.0,

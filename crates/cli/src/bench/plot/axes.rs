@@ -1,18 +1,18 @@
-//! Log axes: coordinates are powers of ten.
+//! Logarithmic axes. Coordinates are base-10 logarithms.
 
 use std::ops::Range;
 
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 
-/// Ends of an axis and its marks, as powers of ten.
+/// Range and tick marks of an axis, as base-10 logarithms.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Axis {
+pub(super) struct LogAxis {
     pub(super) range: Range<f64>,
     pub(super) marks: Vec<f64>,
 }
 
-impl Axis {
-    /// Around these values, with a part of it left free at its beginning; values that are not above 0 are on no log axis.
+impl LogAxis {
+    /// An axis around the positive values, with a fraction `free` left empty at its start.
     pub(super) fn around(values: impl Iterator<Item = f64>, free: f64) -> Self {
         let logs = values.filter(|value| *value > 0.0 && value.is_finite()).map(libm::log10);
         let (low, high) =
@@ -33,7 +33,7 @@ impl Axis {
     }
 }
 
-impl Ranged for Axis {
+impl Ranged for LogAxis {
     type FormatOption = DefaultFormatting;
     type ValueType = f64;
 
@@ -51,7 +51,7 @@ impl Ranged for Axis {
     }
 }
 
-/// `10⁻³`, `2·10⁻³`, `5`
+/// Formats a mark as `10⁻³`, `2·10⁻³` or `5`.
 pub(super) fn power(mark: f64) -> String {
     let (factor, whole) = parts(mark);
     if whole == 0 {
@@ -61,7 +61,7 @@ pub(super) fn power(mark: f64) -> String {
     if factor == 1 { format!("10{digits}") } else { format!("{factor}·10{digits}") }
 }
 
-/// `0.02`, `5`, `200`
+/// Formats a mark as `0.02`, `5` or `200`.
 pub(super) fn plain(mark: f64) -> String {
     let (factor, whole) = parts(mark);
     if (-3..=5).contains(&whole) {
@@ -72,7 +72,7 @@ pub(super) fn plain(mark: f64) -> String {
     }
 }
 
-/// The first digit and the power of ten.
+/// The first digit and the exponent.
 fn parts(mark: f64) -> (i32, i32) {
     let whole = (mark + 1e-9).floor();
     (libm::pow(10.0, mark - whole).round() as i32, whole as i32)
@@ -99,16 +99,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn marks_are_whole_powers_or_few_digits() {
-        let far = Axis::around([1e-5, 0.3].into_iter(), 0.0);
+    fn marks_are_powers_or_simple_numbers() {
+        let far = LogAxis::around([1e-5, 0.3].into_iter(), 0.0);
         assert_eq!(far.marks, [-5.0, -4.0, -3.0, -2.0, -1.0]);
-        let near = Axis::around([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
+        let near = LogAxis::around([0.02, 0.3, -1.0, f64::NAN].into_iter(), 0.0);
         let names: Vec<String> = near.marks.iter().map(|mark| plain(*mark)).collect();
         assert_eq!(names, ["0.02", "0.05", "0.1", "0.2"]);
         let names: Vec<String> = near.marks.iter().map(|mark| power(*mark)).collect();
         assert_eq!(names, ["2·10⁻²", "5·10⁻²", "10⁻¹", "2·10⁻¹"]);
-        assert_eq!(Axis::around([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
-        let half = Axis::around([1e-2, 1.0].into_iter(), 0.5).range;
+        assert_eq!(LogAxis::around([].into_iter(), 0.0).marks, [-1.0, 0.0, 1.0]);
+        let half = LogAxis::around([1e-2, 1.0].into_iter(), 0.5).range;
         assert!((half.start + 4.36).abs() < 1e-9 && (half.end - 0.12).abs() < 1e-9, "{half:?}");
         assert_eq!(power(libm::log10(5.0)), "5");
         assert_eq!((plain(2.0).as_str(), plain(-12.0).as_str()), ("100", "10⁻¹²"));

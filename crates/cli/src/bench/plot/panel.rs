@@ -1,15 +1,15 @@
-//! One scene.
+//! Draws the panel of one scene.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::AXES;
-use super::axes::{Axis, plain, power};
-use crate::bench::results::{MethodResult, SceneResult, Step, Verdict};
+use super::axes::{LogAxis, plain, power};
+use crate::bench::results::{MethodResult, SceneResult, StepResult, Verdict};
 use crate::bench::slope::Slope;
 use crate::scene::sanitize::visible;
 
-/// Colors that the color-blind tell apart, also in this order (Okabe and Ito).
+/// The color-blind safe palette of Okabe and Ito.
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -22,20 +22,21 @@ const COLORS: [RGBColor; 7] = [
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 const GRAY: RGBColor = RGBColor(110, 110, 110);
 
-/// Pixels of a marker's half, and of the bars' ends.
+/// Half the size of a marker in pixels.
 const MARKER: i32 = 4;
 
-type Place<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Failed<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
-type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<Axis, Axis>>;
+/// The drawing area of a panel.
+type PanelArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type DrawError<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
+type Chart<'c, 'a> = ChartContext<'c, SVGBackend<'a>, Cartesian2d<LogAxis, LogAxis>>;
 
-/// Draws it.
-pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Failed<'a>> {
+/// Draws a panel.
+pub(super) fn draw<'a>(scene: &SceneResult, place: &PanelArea<'a>) -> Result<(), DrawError<'a>> {
     let steps = || scene.methods.iter().flat_map(|method| &method.steps);
     let noise = scene.reference.noise;
-    let across = Axis::around(steps().map(|step| step.seconds), 0.0);
+    let across = LogAxis::around(steps().map(|step| step.seconds), 0.0);
     let errors = steps().flat_map(|step| [step.relmse, step.spread[0], step.spread[1]]);
-    let up = Axis::around(errors.chain([noise]), of_legend(scene.methods.len()));
+    let up = LogAxis::around(errors.chain([noise]), of_legend(scene.methods.len()));
     let mut chart = ChartBuilder::on(place)
         .caption(caption(scene), ("sans-serif", 20))
         .margin(14)
@@ -64,12 +65,12 @@ pub(super) fn draw<'a>(scene: &SceneResult, place: &Place<'a>) -> Result<(), Fai
     legend(&mut chart)
 }
 
-/// The scene's name may hold what XML cannot.
+/// The caption, without characters that XML does not allow.
 fn caption(scene: &SceneResult) -> String {
     format!("{}, {}×{}", visible(&scene.scene), scene.width, scene.height)
 }
 
-/// The part of the height that the legend has for itself.
+/// Fraction of the height reserved for the legend.
 fn of_legend(methods: usize) -> f64 {
     (0.05 * (methods as f64 + 1.0) + 0.08).min(0.6)
 }
@@ -78,7 +79,7 @@ fn color(number: usize) -> RGBColor {
     COLORS[number % COLORS.len()]
 }
 
-fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), Failed<'a>> {
+fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), DrawError<'a>> {
     chart
         .configure_series_labels()
         .position(SeriesLabelPosition::LowerLeft)
@@ -89,8 +90,8 @@ fn legend<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>) -> Result<(), Failed<'a>> {
         .draw()
 }
 
-/// The noise of a reference.
-fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &Axis) -> Result<(), Failed<'a>> {
+/// Draws the noise of the references as a dashed line.
+fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &LogAxis) -> Result<(), DrawError<'a>> {
     let dashes = |points: Vec<(f64, f64)>| DashedLineSeries::new(points, 5, 5, GRAY.stroke_width(1));
     let ends = vec![(across.range.start, level), (across.range.end, level)];
     let sample = |(x, y): (i32, i32)| PathElement::new([(x, y), (x + 8, y)], GRAY);
@@ -98,15 +99,15 @@ fn floor<'c, 'a: 'c>(chart: &mut Chart<'c, 'a>, level: f64, across: &Axis) -> Re
     Ok(())
 }
 
-/// From the least to the greatest error of each step.
+/// Draws the range of errors of each step.
 fn bars<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
     color: RGBColor,
-    up: &Axis,
-) -> Result<(), Failed<'a>> {
+    up: &LogAxis,
+) -> Result<(), DrawError<'a>> {
     let seen = method.steps.iter().filter(|step| step.spread[1] > 0.0);
-    let bar = |step: &Step| {
+    let bar = |step: &StepResult| {
         let low = if step.spread[0] > 0.0 { libm::log10(step.spread[0]) } else { up.range.start };
         let high = libm::log10(step.spread[1]);
         let middle = if step.relmse > 0.0 { libm::log10(step.relmse) } else { low };
@@ -116,12 +117,12 @@ fn bars<'c, 'a: 'c>(
     Ok(())
 }
 
-/// The medians, and the method's place in the legend.
+/// Draws the medians, and adds the method to the legend.
 fn line<'c, 'a: 'c>(
     chart: &mut Chart<'c, 'a>,
     method: &MethodResult,
     number: usize,
-) -> Result<(), Failed<'a>> {
+) -> Result<(), DrawError<'a>> {
     let color = color(number);
     let seen = method.steps.iter().filter(|step| step.relmse > 0.0);
     let points: Vec<(f64, f64)> =
@@ -137,7 +138,7 @@ fn line<'c, 'a: 'c>(
     Ok(())
 }
 
-/// A filled shape around a pixel; methods differ in it as well.
+/// A filled marker around a pixel. Methods differ in its shape.
 fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     let corners: &[(i32, i32)] = match number % 4 {
         0 => &[(-1, -1), (1, -1), (1, 1), (-1, 1)],
@@ -150,7 +151,7 @@ fn marker(at: (i32, i32), number: usize) -> Polygon<(i32, i32)> {
     Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), color(number).filled())
 }
 
-/// `path, slope −0.98`
+/// The legend of a method, such as `path, slope −0.98`.
 fn label(method: &MethodResult) -> String {
     let slope = method.slope.map_or(String::new(), |Slope { value, .. }| {
         format!(", slope {}{:.2}", if value < 0.0 { "−" } else { "" }, value.abs())

@@ -1,4 +1,4 @@
-//! The plot in the terminal, in braille: after the work, and above the bar while it goes on.
+//! The plot in the terminal, in braille: at the end, and above the progress bar.
 
 use std::io::IsTerminal;
 
@@ -14,73 +14,73 @@ use crate::progress::seconds;
 use crate::scene::sanitize::visible;
 use crate::tui::paint::as_text_lines;
 
-/// Colors of the methods, in their order, from the palette of the terminal.
+/// Colors of the methods, from the terminal's palette.
 const COLORS: [Color; 6] =
     [Color::Blue, Color::Red, Color::Green, Color::Magenta, Color::Yellow, Color::Cyan];
-/// Signs of the methods' points, in their order: no sign comes back with the same color for thirty methods.
-const SIGNS: [char; 5] = ['o', 'x', '+', '*', '#'];
+/// Markers of the methods. Combinations of marker and color repeat after thirty methods.
+const MARKERS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Rows of a chart.
 const ROWS: u16 = 16;
-/// Columns at most.
-const COLUMNS: u16 = 100;
-/// Nothing can be read in less.
-const LEAST: (u16, u16) = (30, 8);
-/// Rows of a terminal that a chart leaves while the work goes on: what is done, the bar, and the prompt.
-const LEFT: u16 = 6;
+/// Most columns of a chart.
+const MAX_COLUMNS: u16 = 100;
+/// Least size of a readable chart.
+const MIN_SIZE: (u16, u16) = (30, 8);
+/// Rows that a chart leaves free for the current task, the bar and the prompt.
+const RESERVED_ROWS: u16 = 6;
 
-/// A scene with its methods, as far as they are measured.
+/// The points of one scene measured so far.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Lines {
+pub(super) struct ConvergenceChart {
     scene: String,
-    methods: Vec<Line>,
+    methods: Vec<MethodCurve>,
 }
 
-/// A method: seconds and relMSE of its steps.
+/// The curve of a method: seconds and relMSE of its steps.
 #[derive(Clone, Debug, PartialEq)]
-struct Line {
+struct MethodCurve {
     name: String,
     points: Vec<(f64, f64)>,
 }
 
-impl Lines {
+impl ConvergenceChart {
     fn of(scene: &SceneResult) -> Self {
-        let methods = scene.methods.iter().map(|method| Line {
+        let methods = scene.methods.iter().map(|method| MethodCurve {
             name: method.name.clone(),
             points: method.steps.iter().map(|step| (step.seconds, step.relmse)).collect(),
         });
         Self { scene: scene.scene.clone(), methods: methods.collect() }
     }
 
-    /// One more point; those of another scene are forgotten.
+    /// Adds a point. Clears the points of another scene.
     pub(super) fn add(&mut self, scene: &str, method: &str, point: (f64, f64)) {
         if self.scene != scene {
             *self = Self { scene: scene.to_owned(), methods: Vec::new() };
         }
         match self.methods.iter_mut().find(|line| line.name == method) {
             Some(line) => line.points.push(point),
-            None => self.methods.push(Line { name: method.to_owned(), points: vec![point] }),
+            None => self.methods.push(MethodCurve { name: method.to_owned(), points: vec![point] }),
         }
     }
 
-    /// Text above the bar in a terminal of this size: nothing before there are points, or if there is no room.
+    /// The text above the bar in a terminal of this size. Empty without points or space.
     pub(super) fn text(&self, (columns, rows): (u16, u16), is_colored: bool) -> String {
-        // A line that is as wide as the terminal would be two in some.
-        let size = (columns.saturating_sub(1).min(COLUMNS), rows.saturating_sub(LEFT).min(ROWS));
-        if self.methods.is_empty() || size.0 < LEAST.0 || size.1 < LEAST.1 {
+        // Some terminals wrap lines as wide as the terminal.
+        let size = (columns.saturating_sub(1).min(MAX_COLUMNS), rows.saturating_sub(RESERVED_ROWS).min(ROWS));
+        if self.methods.is_empty() || size.0 < MIN_SIZE.0 || size.1 < MIN_SIZE.1 {
             return String::new();
         }
         as_text_lines(&self.drawn(size), is_colored)
     }
 
     fn drawn(&self, (columns, rows): (u16, u16)) -> Buffer {
-        let points: Vec<Vec<(f64, f64)>> = self.methods.iter().map(Line::powers).collect();
-        let styles = SIGNS.iter().cycle().zip(COLORS.iter().cycle());
+        let points: Vec<Vec<(f64, f64)>> = self.methods.iter().map(MethodCurve::log_points).collect();
+        let styles = MARKERS.iter().cycle().zip(COLORS.iter().cycle());
         let lines = self.methods.iter().zip(&points).zip(styles);
         let (trends, signs): (Vec<_>, Vec<_>) =
             lines.map(|((line, points), style)| datasets(&line.name, points, style)).unzip();
         let across = bounds(points.iter().flatten().map(|point| point.0));
         let up = bounds(points.iter().flatten().map(|point| point.1));
-        // Signs lie over all trends.
+        // Draw markers over all lines.
         let chart = Chart::new(trends.into_iter().chain(signs).collect())
             .hidden_legend_constraints((Constraint::Percentage(70), Constraint::Percentage(70)))
             .x_axis(Axis::default().bounds(across).labels(labels(across, seconds)))
@@ -92,7 +92,7 @@ impl Lines {
     }
 }
 
-/// A line through the points, and their signs with the name.
+/// The line through the points, and the markers with the name.
 fn datasets<'a>(
     name: &str,
     points: &'a [(f64, f64)],
@@ -104,34 +104,35 @@ fn datasets<'a>(
     (trend, signs.name(format!("{sign} {}", visible(name))))
 }
 
-impl Line {
-    /// Logarithms of what has one.
-    fn powers(&self) -> Vec<(f64, f64)> {
+impl MethodCurve {
+    /// Base-10 logarithms of the points with positive coordinates.
+    fn log_points(&self) -> Vec<(f64, f64)> {
         let seen = self.points.iter().filter(|point| point.0 > 0.0 && point.1 > 0.0);
         seen.map(|point| (libm::log10(point.0), libm::log10(point.1))).collect()
     }
 }
 
-/// Draws every scene where stdout is a terminal.
+/// Draws every scene if stdout is a terminal.
 pub(super) fn show(results: &Results, console: &Console) {
     if !std::io::stdout().is_terminal() {
         return;
     }
-    let columns = crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(LEAST.0, COLUMNS));
+    let columns =
+        crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(MIN_SIZE.0, MAX_COLUMNS));
     for scene in &results.scenes {
-        console.answer(&format!("{}: relMSE against seconds, both logarithmic", scene.scene));
-        console.text(&as_text_lines(&Lines::of(scene).drawn((columns, ROWS)), console.is_colored()));
+        console.answer(&format!("{}: relMSE over seconds (log–log)", scene.scene));
+        console.text(&as_text_lines(&ConvergenceChart::of(scene).drawn((columns, ROWS)), console.is_colored()));
     }
 }
 
-/// From the least to the greatest, with a little room.
+/// The range of the values, with a margin.
 fn bounds(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let (low, high) = values
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if low > high { [-1.0, 1.0] } else { [low - 0.1, high + 0.1] }
 }
 
-/// At both ends and in the middle.
+/// Labels at both ends and in the middle.
 fn labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<String> {
     [low, (low + high) / 2.0, high].map(|power| word(libm::pow(10.0, power))).to_vec()
 }
@@ -139,10 +140,10 @@ fn labels([low, high]: [f64; 2], word: impl Fn(f64) -> String) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::{MethodResult, ReferenceResult, Step};
+    use crate::bench::{MethodResult, ReferenceResult, StepResult};
 
     fn scene() -> SceneResult {
-        let step = |samples: f64| Step {
+        let step = |samples: f64| StepResult {
             samples,
             budget: None,
             seconds: samples * 0.01,
@@ -168,8 +169,8 @@ mod tests {
     }
 
     #[test]
-    fn the_chart_has_its_lines_names_and_ends() {
-        let buffer = Lines::of(&scene()).drawn((60, ROWS));
+    fn charts_have_lines_names_and_labels() {
+        let buffer = ConvergenceChart::of(&scene()).drawn((60, ROWS));
         let plain = as_text_lines(&buffer, false);
         assert!(plain.chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c)), "{plain}");
         assert!(plain.contains("o path") && plain.contains("201 ms") && plain.contains("1e-1"), "{plain}");
@@ -181,15 +182,15 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_is_drawn_too() {
+    fn empty_charts_are_drawn() {
         let mut empty = scene();
         empty.methods.clear();
-        assert!(!as_text_lines(&Lines::of(&empty).drawn((30, ROWS)), true).is_empty());
+        assert!(!as_text_lines(&ConvergenceChart::of(&empty).drawn((30, ROWS)), true).is_empty());
     }
 
     #[test]
-    fn the_chart_of_the_work_has_the_points_of_one_scene_and_room_below() {
-        let mut lines = Lines::default();
+    fn progress_charts_show_one_scene() {
+        let mut lines = ConvergenceChart::default();
         assert_eq!(lines.text((80, 24), false), "");
         lines.add("a.toml", "path", (0.1, 0.5));
         lines.add("a.toml", "path", (0.4, 0.1));

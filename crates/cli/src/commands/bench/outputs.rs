@@ -1,26 +1,26 @@
-//! The files of `glimt bench`, held against those that it reads and against each other.
+//! Output files of `glimt bench`, which must differ from the inputs and each other.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::progress::Said;
+use super::progress::BenchProgress;
 use crate::args::BenchArgs;
 use crate::bench::{Results, csv, plot};
 use crate::console::Console;
 use crate::control::CancelToken;
 use crate::exit::Exit;
-use crate::lower::STANDARD;
+use crate::lower::STDOUT_NAME;
 use crate::output::write::{self, Guard};
 use crate::output::{
     self, FileIdentity, Losses, OutputError, is_one_file, replaced_json, replaced_plot, replaced_table,
 };
 use crate::system::{describe_error, file};
 
-/// Files to write, and files that must not be written.
-pub(super) struct Outputs {
-    /// Option, file, and what it holds.
-    files: Vec<(&'static str, PathBuf, Kind)>,
-    /// Role of each input in this call, and its file.
+/// Files to write, and inputs that must not be overwritten.
+pub(super) struct BenchOutputs {
+    /// Option, file and content.
+    files: Vec<(&'static str, PathBuf, OutputKind)>,
+    /// Role and path of each input.
     inputs: Vec<(&'static str, PathBuf)>,
     baseline: Option<PathBuf>,
     /// Whether files that glimt did not write may be replaced.
@@ -28,25 +28,26 @@ pub(super) struct Outputs {
 }
 
 #[derive(Clone, Copy)]
-enum Kind {
+/// Content of an output.
+enum OutputKind {
     Csv,
     Json,
     Plot,
 }
 
-impl Outputs {
-    /// Reports the errors that are known before the work.
+impl BenchOutputs {
+    /// Checks the outputs before measuring and reports errors.
     pub(super) fn of(args: &BenchArgs, scenes: &[PathBuf], console: &Console) -> Result<Self, Exit> {
         let all = [
-            ("--csv", &args.csv, Kind::Csv),
-            ("--json", &args.json, Kind::Json),
-            ("--plot", &args.plot, Kind::Plot),
+            ("--csv", &args.csv, OutputKind::Csv),
+            ("--json", &args.json, OutputKind::Json),
+            ("--plot", &args.plot, OutputKind::Plot),
         ];
         let files: Vec<_> =
             all.into_iter().filter_map(|(option, file, kind)| Some((option, file.clone()?, kind))).collect();
-        let scenes = scenes.iter().map(|scene| ("a scene of this call", scene.clone()));
-        let references = args.reference.iter().map(|file| ("a reference of this call", file.clone()));
-        let baseline = args.baseline.iter().map(|file| ("the baseline of this call", file.clone()));
+        let scenes = scenes.iter().map(|scene| ("one of the scenes", scene.clone()));
+        let references = args.reference.iter().map(|file| ("one of the references", file.clone()));
+        let baseline = args.baseline.iter().map(|file| ("the baseline", file.clone()));
         let inputs = scenes.chain(references).chain(baseline).collect();
         let (baseline, replaces_foreign) = (args.baseline.clone(), args.force);
         let outputs = Self { files, inputs, baseline, replaces_foreign };
@@ -59,23 +60,24 @@ impl Outputs {
         Ok(outputs)
     }
 
-    fn check(&self, index: usize, path: &Path, kind: Kind) -> Result<(), OutputError> {
+    fn check(&self, index: usize, path: &Path, kind: OutputKind) -> Result<(), OutputError> {
         self.may_replace(index, path)?;
         let is_svg = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
-        if path == Path::new(STANDARD) && !matches!(kind, Kind::Plot) {
+        if path == Path::new(STDOUT_NAME) && !matches!(kind, OutputKind::Plot) {
             let (option, ..) = self.files[index];
-            let reason = format!("{option} {STANDARD} is standard output, which has the tables: name a file");
+            let reason =
+                format!("{option} {STDOUT_NAME} would mix with the tables on standard output: pass a file");
             return Err(OutputError::Refused { reason });
         }
-        if matches!(kind, Kind::Plot) && !is_svg {
+        if matches!(kind, OutputKind::Plot) && !is_svg {
             let reason =
-                format!("cannot write {}: the plot is an SVG; use a name that ends in .svg", path.display());
+                format!("cannot write {}: plots are SVG files; use the extension .svg", path.display());
             return Err(OutputError::Refused { reason });
         }
         output::check_place(path)
     }
 
-    /// The file of this number, which leads to `real`, must be no input and no other output.
+    /// Checks that output `index`, which resolves to `real`, is neither an input nor another output.
     fn may_replace(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         if FileIdentity::of(real).is_none() {
             return Ok(());
@@ -84,7 +86,7 @@ impl Outputs {
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
-                "cannot write {}: it is {what}; name another file with {option} FILE",
+                "cannot write {}: it is {what}; choose another file with {option} FILE",
                 path.display()
             );
             Err(OutputError::Refused { reason })
@@ -95,62 +97,62 @@ impl Outputs {
         if let Some((other, ..)) = self.files[..index].iter().find(|(_, other, _)| is_it(other)) {
             return refused(&format!("the file of {other}"));
         }
-        if self.replaces_foreign { Ok(()) } else { self.check_own(index, real) }
+        if self.replaces_foreign { Ok(()) } else { self.check_foreign(index, real) }
     }
 
-    /// Refuses files that glimt did not write: `--csv scene.toml` lacks its own file's name.
-    fn check_own(&self, index: usize, real: &Path) -> Result<(), OutputError> {
+    /// Rejects files not written by glimt, as in `--csv scene.toml` without a file name after `--csv`.
+    fn check_foreign(&self, index: usize, real: &Path) -> Result<(), OutputError> {
         let (option, path, kind) = &self.files[index];
         let replaced = match kind {
-            Kind::Csv => replaced_table(real, csv::HEAD),
-            // What a baseline can be read from; no run writes one without scenes.
-            Kind::Json => {
+            OutputKind::Csv => replaced_table(real, csv::HEAD),
+            // Accept files that are valid baselines. All of them have scenes.
+            OutputKind::Json => {
                 replaced_json(real, "a file of results", |found: &Results| !found.scenes.is_empty())
             }
-            Kind::Plot => replaced_plot(real, &plot::AXES),
+            OutputKind::Plot => replaced_plot(real, &plot::AXES),
         };
         let Some(why) = replaced.why_kept() else { return Ok(()) };
-        let way_out = format!("name another file with {option} FILE, or --force replaces it");
+        let way_out = format!("choose another file with {option} FILE, or use --force");
         Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {way_out}", path.display()) })
     }
 
-    /// The older run with its name.
+    /// Reads the baseline. Returns its name and results.
     pub(super) fn baseline(&self, console: &Console) -> Result<Option<(String, Results)>, Exit> {
         let Some(path) = &self.baseline else { return Ok(None) };
         let name = path.display().to_string();
         let read =
             bytes_of(path).map_err(|why| console.fail(Exit::WRONG, &format!("cannot read {name}: {why}")))?;
         let results = serde_json::from_slice(&read).map_err(|error| {
-            let way_out = "name a file that `glimt bench --json FILE` wrote";
-            console.fail(Exit::WRONG, &format!("{name} is no baseline: {error}; {way_out}"))
+            let way_out = "pass a file written by `glimt bench --json FILE`";
+            console.fail(Exit::WRONG, &format!("{name} is not a baseline: {error}; {way_out}"))
         })?;
         Ok(Some((name, results)))
     }
 
-    /// All of them; one that cannot be written does not keep the others from it.
+    /// Writes all files, even if some of them fail.
     pub(super) fn write(
         &self,
         results: &Results,
-        said: &Said,
+        progress: &BenchProgress,
         console: &Console,
         token: &CancelToken,
     ) -> Result<(), Exit> {
         let written = (0..self.files.len()).map(|index| {
             let (_, path, _) = &self.files[index];
-            let written = self.write_one(index, results, said, token);
+            let written = self.write_one(index, results, progress, token);
             let bytes = written.map_err(|why| console.fail(Exit::FAILED, &why))?;
-            said.written(path, bytes);
+            progress.written(path, bytes);
             Ok(())
         });
         written.collect::<Vec<_>>().into_iter().collect()
     }
 
-    /// Gives its bytes; the error says why not.
+    /// Writes one file and returns its size.
     fn write_one(
         &self,
         index: usize,
         results: &Results,
-        said: &Said,
+        progress: &BenchProgress,
         token: &CancelToken,
     ) -> Result<usize, String> {
         let (_, path, kind) = &self.files[index];
@@ -158,37 +160,33 @@ impl Outputs {
             content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let losses = Losses::Told(&|what| said.warned(&what));
+        let losses = Losses::Told(&|what| progress.warned(&what));
         let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
         let written = write::atomic_until(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }
 
-/// All bytes of a file of results; refuses anything but a regular file of limited size.
+/// Reads a baseline. Rejects anything but a regular file of limited size.
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
-    /// Bytes of the results of a million pictures.
-    const MOST: u64 = 256 << 20;
+    /// Enough for the results of a million images.
+    const MAX_BYTES: u64 = 256 << 20;
     let words = |error: std::io::Error| describe_error(&error);
     let (file, metadata) = file::open(path)
         .map_err(words)?
         .map_err(|kind| format!("it is {}, not a regular file", kind.words()))?;
-    if metadata.len() > MOST {
-        return Err(format!(
-            "it has {} bytes, more than the {} MiB that are read",
-            metadata.len(),
-            MOST >> 20
-        ));
+    if metadata.len() > MAX_BYTES {
+        return Err(format!("it has {} bytes; the limit is {} MiB", metadata.len(), MAX_BYTES >> 20));
     }
     let mut bytes = Vec::new();
-    file.take(MOST).read_to_end(&mut bytes).map_err(words)?;
+    file.take(MAX_BYTES).read_to_end(&mut bytes).map_err(words)?;
     Ok(bytes)
 }
 
-fn content(kind: Kind, results: &Results) -> Result<Vec<u8>, String> {
+fn content(kind: OutputKind, results: &Results) -> Result<Vec<u8>, String> {
     match kind {
-        Kind::Csv => Ok(csv::csv(results).into_bytes()),
-        Kind::Json => Ok(output::json::file(results).map_err(|error| error.to_string())?.into_bytes()),
-        Kind::Plot => Ok(plot::svg(results)?.into_bytes()),
+        OutputKind::Csv => Ok(csv::csv(results).into_bytes()),
+        OutputKind::Json => Ok(output::json::file(results).map_err(|error| error.to_string())?.into_bytes()),
+        OutputKind::Plot => Ok(plot::svg(results)?.into_bytes()),
     }
 }

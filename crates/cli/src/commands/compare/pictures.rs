@@ -1,4 +1,4 @@
-//! The pictures and their difference in the terminal, above the table.
+//! Shows the images and their difference in the terminal, above the table.
 
 use std::io::IsTerminal;
 use std::path::Path;
@@ -12,10 +12,10 @@ use crate::film::tone::{ToneMapping, develop};
 use crate::scene::sanitize::visible;
 use crate::tui::{NamedImage, images_as_text};
 
-/// Less FLIP than this is hardly seen in its colors.
-const FAINT: f32 = 0.1;
+/// FLIP below this is hard to see in false color.
+const MIN_VISIBLE_FLIP: f32 = 0.1;
 
-/// Lines for stdout; none if the terminal has no room.
+/// Renders the images as text. Empty if the terminal is too small.
 pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> String {
     let is_terminal = std::io::stdout().is_terminal();
     let is_wanted = match args.pictures {
@@ -26,11 +26,11 @@ pub(super) fn lines(args: &CompareArgs, pair: &Pair, measured: &Measured) -> Str
     if !is_wanted {
         return String::new();
     }
-    let (difference, words) = difference(pair, measured);
+    let (difference, description) = difference(pair, measured);
     let pictures = [
         named(&name(&args.a), pair.a()),
         named(&format!("{}, the reference", name(&args.b)), pair.b()),
-        named(&words, &difference),
+        named(&description, &difference),
     ];
     images_as_text(&pictures, args.color, is_terminal)
 }
@@ -45,21 +45,21 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
-/// An image as a display shows it, with its name.
+/// Tone maps an image for display.
 fn named(name: &str, image: &RadianceImage) -> NamedImage {
     NamedImage { name: visible(name).into_owned(), picture: develop(image, &ToneMapping::default()) }
 }
 
-/// FLIP in colors; if that is all but black, |a - b| as bright as it can be shown.
+/// FLIP in false color, or |a - b| scaled to its maximum if FLIP is too small to see.
 fn difference(pair: &Pair, measured: &Measured) -> (RadianceImage, String) {
     let errors = &measured.errors;
-    if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= FAINT) {
+    if errors.max == 0.0 || measured.flip.iter().any(|error| *error >= MIN_VISIBLE_FLIP) {
         return (compare::heat(pair, &measured.flip), "FLIP".to_owned());
     }
     let mut image = compare::absolute(pair);
     let scale = (1.0 / errors.max) as f32;
     image.pixels.iter_mut().for_each(|pixel| *pixel *= scale);
-    (image, format!("|a - b|, white: {}", figure(errors.max)))
+    (image, format!("|a - b|, white is {}", figure(errors.max)))
 }
 
 #[cfg(test)]
@@ -75,14 +75,11 @@ mod tests {
     }
 
     #[test]
-    fn the_difference_is_what_can_be_seen() {
+    fn difference_is_always_visible() {
         assert_eq!(shown(0.0).1, "FLIP");
-        assert_eq!(shown(0.5).1, "FLIP", "black for nothing");
-        let (faint, words) = shown(0.501);
-        assert!(
-            words.starts_with("|a - b|, white: 0.000999") || words.starts_with("|a - b|, white: 0.00100"),
-            "{words}"
-        );
+        assert_eq!(shown(0.5).1, "FLIP", "large errors use FLIP");
+        let (faint, name) = shown(0.501);
+        assert!(name.contains("0.000999") || name.contains("0.00100"), "{name}");
         assert!(faint.pixels[0] == Vec3::ZERO && (faint.pixels[1].x - 1.0).abs() < 1e-5, "{faint:?}");
     }
 }

@@ -1,8 +1,8 @@
-//! bash: its script, and candidates quoted as the line has to have them.
+//! Completion for bash, with quoted candidates.
 //!
-//! bash puts candidates on the line as they are, so that a name with `$(…)` in it would run with the line. `clap_complete`'s adapter
-//! leaves quoting to nobody. This one gets the line itself: it reads words as bash does, without expanding anything, and quotes what
-//! replaces the last one.
+//! bash inserts candidates unquoted, so a name with `$(…)` would be executed with the command, and `clap_complete`'s adapter does
+//! not quote them. This adapter receives the whole line, splits it into words as bash does but without expansion, and quotes the
+//! candidates.
 
 use std::ffi::OsString;
 use std::io::{Error, Write};
@@ -13,13 +13,13 @@ use clap_complete::env::EnvCompleter;
 
 use crate::args::candidates::remember;
 
-/// The script. `$2` is what the candidates replace: the end of the line behind the last blank, `=`, `:` or open quote.
+/// The script. `$2` is the text that candidates replace: the end of the line after the last space, `=`, `:` or open quote.
 const SCRIPT: &str = r#"_glimt_complete() {
     local answer line space=true
     compopt +o nospace 2> /dev/null && space=false
     COMPREPLY=()
     answer=$(GLIMT_COMPLETE=bash "glimt" -- "${COMP_LINE:0:COMP_POINT}" "$2") || return
-    # Candidates come quoted, one a line.
+    # Candidates are quoted, one per line.
     while IFS= read -r line; do
         [[ -n $line ]] && COMPREPLY+=("$line")
     done <<< "$answer"
@@ -34,7 +34,7 @@ else
 fi
 "#;
 
-/// The adapter for bash. Its script passes the line up to the cursor, and the part at its end that a candidate replaces.
+/// The adapter for bash. Its script passes the line up to the cursor, and the end of it that a candidate replaces.
 pub(super) struct Bash;
 
 impl EnvCompleter for Bash {
@@ -67,7 +67,7 @@ impl EnvCompleter for Bash {
         let text = |at: usize| args.get(at).and_then(|arg| arg.to_str());
         let (Some(line), Some(replaced)) = (text(0), text(1)) else { return Ok(()) };
         let Some(before) = line.strip_suffix(replaced) else { return Ok(()) };
-        // Read the words, and how the place is quoted where candidates go.
+        // Split the line, and determine the quoting at the cursor.
         let words: Vec<OsString> = read(line).words.into_iter().map(OsString::from).collect();
         let kept = read(before);
         let begun = if before.ends_with(is_blank) && kept.quote == Quote::None {
@@ -88,7 +88,7 @@ impl EnvCompleter for Bash {
     }
 }
 
-/// Quotes around a place in a line.
+/// The quote open at the end of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quote {
     None,
@@ -96,8 +96,8 @@ enum Quote {
     Double,
 }
 
-/// Words of a line without their quotes, and the quote that is open at its end. The last word is empty after a blank.
-struct Line {
+/// The unquoted words of a line, and the quote that is open at its end. The last word is empty after a space.
+struct CommandLine {
     words: Vec<String>,
     quote: Quote,
 }
@@ -106,8 +106,8 @@ fn is_blank(character: char) -> bool {
     matches!(character, ' ' | '\t' | '\n')
 }
 
-/// Takes a line apart as bash does; expansions stay as they are written.
-fn read(line: &str) -> Line {
+/// Splits a line as bash does, without expansions.
+fn read(line: &str) -> CommandLine {
     let mut words = vec![String::new()];
     let mut quote = Quote::None;
     let mut characters = line.trim_start_matches(is_blank).chars().peekable();
@@ -132,14 +132,14 @@ fn read(line: &str) -> Line {
             word.push(taken);
         }
     }
-    Line { words, quote }
+    CommandLine { words, quote }
 }
 
-/// A candidate as the line has to have it at a place with this quote open. `None` if it cannot stand there.
+/// Quotes a candidate for a position with this open quote. `None` if it cannot be written there.
 fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     let is_plain = |c: char| c.is_alphanumeric() || "_./,:=@%+-".contains(c);
     if text.chars().any(char::is_control) {
-        // Between quotes there is no way to write these.
+        // Control characters cannot be written inside quotes.
         return (quote == Quote::None)
             .then(|| format!("$'{}'", text.chars().map(escaped).collect::<String>()));
     }
@@ -153,7 +153,7 @@ fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
                 continue;
             }
             Quote::Single => {}
-            // A backslash before it would stay.
+            // A backslash before `!` would be kept.
             Quote::Double if character == '!' => {
                 out.push_str(r#""\!""#);
                 continue;
@@ -166,11 +166,11 @@ fn quoted(text: &str, quote: Quote, keeps_home: bool) -> Option<String> {
     Some(out)
 }
 
-/// A character between `$'` and `'`.
+/// Escapes a character for `$'…'`.
 fn escaped(character: char) -> String {
     match character {
         '\'' | '\\' => format!("\\{character}"),
-        // Octal, of at most three digits, takes nothing of what follows.
+        // Three octal digits cannot merge with the next character.
         control if control.is_ascii_control() => format!("\\{:03o}", u32::from(control)),
         control if control.is_control() => format!("\\u{:04x}", u32::from(control)),
         other => other.to_string(),
@@ -181,9 +181,9 @@ fn escaped(character: char) -> String {
 mod tests {
     use super::*;
 
-    /// Whatever a name holds, bash reads it as that one word.
+    /// bash reads every quoted name back as one word.
     #[test]
-    fn bash_reads_back_what_is_quoted() {
+    fn quoted_names_survive_bash() {
         let names = [
             "plain.toml",
             "my scene.toml",
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_read_as_bash_reads_them() {
+    fn lines_are_split_like_bash() {
         let line = read("glimt  --set a=\"b c\"\\ d 'e\\' \"f\\$\\g ");
         assert_eq!(line.words, ["glimt", "--set", "a=b c d", "e\\", "f$\\g "]);
         assert_eq!(line.quote, Quote::Double);

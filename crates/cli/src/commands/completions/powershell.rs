@@ -1,4 +1,4 @@
-//! PowerShell: its script, and candidates quoted as the line has to have them.
+//! Completion for PowerShell, with quoted candidates.
 
 use std::ffi::OsString;
 use std::io::{Error, Write};
@@ -9,8 +9,8 @@ use clap_complete::env::EnvCompleter;
 
 use crate::args::candidates::remember;
 
-/// The script. It evaluates nothing of the line, unlike `clap_complete`'s, which runs a `$(…)` in it when the key is pressed. The
-/// last word has a mark before it: some versions do not pass words that are empty.
+/// The script. It does not evaluate the line, unlike `clap_complete`'s, which executes a `$(…)` on completion. The last word is
+/// prefixed with `+`, as some versions do not pass empty arguments.
 const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -ScriptBlock {
     param($wordToComplete, $commandAst, $cursorPosition)
     $words = @()
@@ -40,7 +40,7 @@ const SCRIPT: &str = r#"Register-ArgumentCompleter -Native -CommandName glimt -S
 }
 "#;
 
-/// The adapter for PowerShell. An answer has a line for each candidate: quoted, plain, and its description, with tabs between.
+/// The adapter for PowerShell. Prints a line for each candidate: quoted, unquoted and description, separated by tabs.
 pub(super) struct Powershell;
 
 impl EnvCompleter for Powershell {
@@ -91,13 +91,13 @@ impl EnvCompleter for Powershell {
     }
 }
 
-/// A word as a line of PowerShell has to have it.
+/// Quotes a word for PowerShell.
 fn quoted(text: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_./\\:=+-".contains(c);
     if text.chars().all(is_plain) {
         return text.to_owned();
     }
-    // It takes typographic quotes for quotes too.
+    // PowerShell treats typographic quotes as quotes.
     let doubled = |c: char| if "'‘’‚‛".contains(c) { format!("{c}{c}") } else { c.to_string() };
     format!("'{}'", text.chars().map(doubled).collect::<String>())
 }
@@ -107,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_that_mean_something_are_quoted() {
+    fn special_characters_are_quoted() {
         assert_eq!(quoted("render.integrator=path"), "render.integrator=path");
         assert_eq!(quoted("x$(touch y).toml"), "'x$(touch y).toml'");
         assert_eq!(quoted("it's"), "'it''s'");

@@ -1,16 +1,16 @@
-//! Colors of a text, as swatches in the editor: linear numbers shown in sRGB.
+//! Color swatches in the editor. Linear numbers are converted to sRGB.
 
 use lsp_types::{Color, ColorInformation, ColorPresentation};
 use serde_json::{Value, json};
 
-use super::document::Document;
+use super::document::OpenDocument;
 use crate::math::color::{linear_to_srgb, srgb8_to_linear};
 use crate::scene::keys::color_bytes;
 use crate::scene::keys::key::ValueKind;
 use crate::scene::outline::OutlineKey;
 
-/// All colors of a text.
-pub(super) fn all(document: &Document) -> Value {
+/// Returns all colors of a text.
+pub(super) fn all(document: &OpenDocument) -> Value {
     let mut found = Vec::new();
     for table in &document.tables {
         let known = table.known();
@@ -28,7 +28,7 @@ pub(super) fn all(document: &Document) -> Value {
     json!(found)
 }
 
-/// A value as a color; numbers above 1 are as bright as a screen is.
+/// Parses a value as a color. Numbers are clamped to 1.
 fn color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
         Some(text) => color_bytes(text)?,
@@ -48,7 +48,7 @@ fn color(text: &str, key: &OutlineKey) -> Option<Color> {
     Some(Color { red, green, blue, alpha: 1.0 })
 }
 
-/// A chosen color as texts: `#rrggbb`, and linear numbers.
+/// Formats a color chosen in the editor, as `#rrggbb` and as linear numbers.
 pub(super) fn presentations(params: &Value) -> Option<Value> {
     let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
     let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);

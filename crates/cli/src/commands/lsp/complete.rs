@@ -1,4 +1,4 @@
-//! Completion: tables, keys, words, and the names that the text defines.
+//! Completion of tables, keys, values and names defined in the text.
 
 use lsp_types::{
     CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, MarkupContent, MarkupKind, Range,
@@ -6,27 +6,27 @@ use lsp_types::{
 };
 use serde_json::{Value, json};
 
-use super::document::Document;
+use super::document::OpenDocument;
 use super::look::{described, texture_keys};
-use super::place::{Place, Section, place};
+use super::place::{CursorContext, Section, place};
 use crate::scene::keys::key::{Form, KeyInfo, ValueKind, Word};
 use crate::scene::keys::{color_names, tables};
 
-/// The candidates at a byte of the text. `None` if the text is nothing of a scene there.
-pub(super) fn complete(document: &Document, offset: usize) -> Option<Value> {
+/// The candidates at a byte offset. `None` if nothing can be completed there.
+pub(super) fn complete(document: &OpenDocument, offset: usize) -> Option<Value> {
     let items = match place(&document.text, offset)? {
-        Place::Header => headers(document, offset),
-        Place::Key { of, given, is_assigned } => keys(of, &given, is_assigned),
-        Place::Value { of, key, is_quoted } if key == "type" => types(of, is_quoted),
-        Place::Value { of, key, is_quoted } => {
+        CursorContext::Header => headers(document, offset),
+        CursorContext::Key { of, given, is_assigned } => keys(of, &given, is_assigned),
+        CursorContext::Value { of, key, is_quoted } if key == "type" => types(of, is_quoted),
+        CursorContext::Value { of, key, is_quoted } => {
             of.key(&key).map(|key| values(document, key.kind, is_quoted))?
         }
-        Place::InnerKey { given } => {
+        CursorContext::InnerKey { given } => {
             let keys = texture_keys().into_iter().filter(|(name, _)| !given.iter().any(|one| one == name));
             keys.map(|(name, doc)| item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = ")))
                 .collect()
         }
-        Place::InnerValue { key, is_quoted } => match key.as_str() {
+        CursorContext::InnerValue { key, is_quoted } => match key.as_str() {
             "texture" => names(document, "textures", is_quoted),
             "channel" => {
                 words(&crate::scene::keys::key::words::<crate::scene::description::Channel>(), is_quoted)
@@ -48,8 +48,8 @@ fn item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> Com
     }
 }
 
-/// Headers of tables, each in the place of what is typed of one, with the brackets that an editor may have closed.
-fn headers(document: &Document, offset: usize) -> Vec<CompletionItem> {
+/// Table headers. Each replaces the header typed so far, including brackets closed by the editor.
+fn headers(document: &OpenDocument, offset: usize) -> Vec<CompletionItem> {
     let before = &document.text[..offset];
     let line = before.rsplit('\n').next().unwrap_or_default().trim_start();
     let rest = &document.text[offset..];
@@ -70,7 +70,7 @@ fn headers(document: &Document, offset: usize) -> Vec<CompletionItem> {
     .collect()
 }
 
-/// Keys of a table that are not given. Without a value, if their `=` is there.
+/// Missing keys of a table, with example values unless `=` already follows.
 fn keys(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
     let whole =
         |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
@@ -96,7 +96,7 @@ fn types(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
     words(&list, is_quoted)
 }
 
-fn values(document: &Document, kind: ValueKind, is_quoted: bool) -> Vec<CompletionItem> {
+fn values(document: &OpenDocument, kind: ValueKind, is_quoted: bool) -> Vec<CompletionItem> {
     let texture = |more: &str| {
         item("{ texture = … }", CompletionItemKind::STRUCT, "", format!("{{ texture = \"\"{more} }}"))
     };
@@ -134,8 +134,8 @@ fn words(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
     list.iter().map(word).collect()
 }
 
-/// Names that the text gives to tables.
-fn names(document: &Document, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
+/// Names of tables defined in the text.
+fn names(document: &OpenDocument, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
     let named =
         document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());
     named

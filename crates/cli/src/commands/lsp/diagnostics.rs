@@ -1,26 +1,26 @@
-//! Mistakes as the protocol has them.
+//! Converts diagnostics to the protocol.
 
 use std::path::Path;
 
 use lsp_types::{Diagnostic, DiagnosticSeverity, Range};
 
-use super::document::Document;
+use super::document::OpenDocument;
 use crate::control::CancelToken;
 use crate::pipeline::Checker;
 use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
 use crate::scene::parse;
 
-/// Mistakes in a text.
-pub(super) fn of_text(document: &Document) -> Vec<Diagnostic> {
+/// Diagnostics of a text.
+pub(super) fn of_text(document: &OpenDocument) -> Vec<Diagnostic> {
     let found = parse(document.text.as_str().into(), &document.path).diagnostics;
     found.iter().map(|one| diagnostic(document, one)).collect()
 }
 
-/// Mistakes in the file and in all that it names, as `glimt check` has them. `None` if the file has another text, if it cannot be
-/// read, or if the token is cancelled.
+/// Diagnostics of the file and its referenced files, as in `glimt check`. `None` if the file differs from the open text, cannot
+/// be read, or the token is cancelled.
 pub(super) fn of_files(
-    document: &Document,
+    document: &OpenDocument,
     checker: &mut Checker,
     token: &CancelToken,
 ) -> Option<Vec<Diagnostic>> {
@@ -35,7 +35,7 @@ pub(super) fn of_files(
     Some(found.iter().map(|one| diagnostic(document, one)).collect())
 }
 
-fn diagnostic(document: &Document, one: &diagnostic::Diagnostic) -> Diagnostic {
+fn diagnostic(document: &OpenDocument, one: &diagnostic::Diagnostic) -> Diagnostic {
     let is_here = one.path == document.path;
     let place = one.place.as_ref();
     let range = place.filter(|_| is_here).map_or(Range::default(), |place| document.span(&place.span));

@@ -1,4 +1,4 @@
-//! An open text. Positions of the protocol count UTF-16 units in a line.
+//! An open document. Positions in the protocol are lines and UTF-16 code units.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -7,26 +7,26 @@ use lsp_types::{Position, Range as Span};
 
 use crate::scene::outline::{OutlineTable, outline};
 
-/// A text as the client has it.
+/// An open document of the client.
 #[derive(Clone, Debug)]
-pub(super) struct Document {
+pub(super) struct OpenDocument {
     pub(super) path: PathBuf,
     pub(super) version: i32,
     pub(super) text: String,
     /// The tables of the text.
     pub(super) tables: Vec<OutlineTable>,
-    /// Beginnings of the lines.
+    /// Byte offsets of the line starts.
     lines: Vec<usize>,
 }
 
-impl Document {
+impl OpenDocument {
     pub(super) fn new(path: PathBuf, version: i32, text: String) -> Self {
         let starts = text.match_indices('\n').map(|(at, _)| at + 1);
         let lines = std::iter::once(0).chain(starts).collect();
         Self { path, version, tables: outline(&text), lines, text }
     }
 
-    /// The byte of a position; of one behind the end of its line, that end.
+    /// The byte offset of a position, clamped to the end of its line.
     pub(super) fn offset(&self, position: Position) -> usize {
         let line = usize::try_from(position.line).unwrap_or(usize::MAX);
         let Some(&start) = self.lines.get(line) else { return self.text.len() };
@@ -41,7 +41,7 @@ impl Document {
         start + text.len()
     }
 
-    /// The position of a byte.
+    /// The position of a byte offset.
     pub(super) fn position(&self, offset: usize) -> Position {
         let offset = offset.min(self.text.len());
         let line = self.lines.partition_point(|start| *start <= offset) - 1;
@@ -60,8 +60,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn positions_count_utf_16_units() {
-        let document = Document::new(PathBuf::new(), 0, "a = 1\n# ä𝄞x\n\n".to_owned());
+    fn positions_count_utf_16_code_units() {
+        let document = OpenDocument::new(PathBuf::new(), 0, "a = 1\n# ä𝄞x\n\n".to_owned());
         for (offset, line, character) in
             [(0, 0, 0), (5, 0, 5), (6, 1, 0), (10, 1, 3), (14, 1, 5), (15, 1, 6), (16, 2, 0)]
         {

@@ -1,7 +1,7 @@
-//! The thread that reads the files which texts name.
+//! A thread that checks the files referenced by open documents.
 //!
-//! One thread reads for all texts, with one checker, so that what has not changed is not read again. Of each text only the newest
-//! request waits, and it cancels an older one that is under way.
+//! All documents share one thread and one checker, so unchanged files are not read again. Only the newest request of each
+//! document is kept, and it cancels an older one that is running.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,36 +10,38 @@ use std::thread::JoinHandle;
 use lsp_types::{Diagnostic, Uri};
 
 use super::diagnostics;
-use super::document::Document;
+use super::document::OpenDocument;
 use crate::control::CancelToken;
 use crate::pipeline::Checker;
 
-/// A thread that reads files, until it is dropped.
+/// A thread that checks files until it is dropped.
 pub(super) struct FileThread {
-    shared: Arc<Shared>,
+    shared: Arc<RequestQueue>,
     thread: Option<JoinHandle<()>>,
 }
 
-/// Requests, and a signal that they have changed.
+/// The requests, with a condition variable for changes.
 #[derive(Default)]
-struct Shared {
+struct RequestQueue {
     requests: Mutex<Requests>,
     changed: Condvar,
 }
 
-/// Requests that wait, and the one under way.
+/// Pending requests and the running one.
 #[derive(Default)]
 struct Requests {
-    /// At most one for each text, in the order of their coming.
-    waiting: VecDeque<(Uri, Document)>,
+    /// At most one per document, in order of arrival.
+    waiting: VecDeque<(Uri, OpenDocument)>,
     running: Option<(Uri, CancelToken)>,
     is_over: bool,
 }
 
 impl FileThread {
-    /// Starts a thread that gives what it finds to a function. `None` if the system has no thread left.
-    pub(super) fn start(publish: impl Fn(Uri, &Document, Vec<Diagnostic>) + Send + 'static) -> Option<Self> {
-        let shared = Arc::<Shared>::default();
+    /// Starts a thread that passes diagnostics to `publish`. `None` if no thread can be created.
+    pub(super) fn start(
+        publish: impl Fn(Uri, &OpenDocument, Vec<Diagnostic>) + Send + 'static,
+    ) -> Option<Self> {
+        let shared = Arc::<RequestQueue>::default();
         let work = Arc::clone(&shared);
         let read = move || {
             let mut checker = Checker::default();
@@ -53,8 +55,8 @@ impl FileThread {
         Some(Self { shared, thread: Some(thread) })
     }
 
-    /// Reads the files of a text, after those of texts that came before.
-    pub(super) fn read(&self, uri: Uri, document: Document) {
+    /// Queues a check of the files of a document.
+    pub(super) fn check(&self, uri: Uri, document: OpenDocument) {
         self.shared.lock().put(uri, document);
         self.shared.changed.notify_one();
     }
@@ -65,19 +67,19 @@ impl Drop for FileThread {
         self.shared.lock().end();
         self.shared.changed.notify_one();
         if let Some(thread) = self.thread.take() {
-            // What a thread that died was to say is not missed any more.
+            // Ignore a panic of the thread.
             let _ = thread.join();
         }
     }
 }
 
-impl Shared {
+impl RequestQueue {
     fn lock(&self) -> MutexGuard<'_, Requests> {
         self.requests.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for the next request. `None` at the end.
-    fn next(&self) -> Option<(Uri, Document, CancelToken)> {
+    /// Waits for the next request. `None` after [`Requests::end`].
+    fn next(&self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let mut requests = self.lock();
         requests.running = None;
         let is_idle = |requests: &mut Requests| requests.waiting.is_empty() && !requests.is_over;
@@ -87,7 +89,7 @@ impl Shared {
 }
 
 impl Requests {
-    fn put(&mut self, uri: Uri, document: Document) {
+    fn put(&mut self, uri: Uri, document: OpenDocument) {
         if let Some((_, token)) = self.running.as_ref().filter(|(running, _)| *running == uri) {
             token.cancel();
         }
@@ -95,7 +97,7 @@ impl Requests {
         self.waiting.push_back((uri, document));
     }
 
-    fn take(&mut self) -> Option<(Uri, Document, CancelToken)> {
+    fn take(&mut self) -> Option<(Uri, OpenDocument, CancelToken)> {
         let (uri, document) = self.waiting.pop_front().filter(|_| !self.is_over)?;
         let token = CancelToken::new();
         self.running = Some((uri.clone(), token.clone()));
@@ -115,16 +117,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_newest_request_of_each_text_is_the_only_one() {
+    fn only_the_newest_request_is_kept() {
         let uri = |name: &str| name.parse::<Uri>().expect("an address");
-        let document = |version| Document::new("a.toml".into(), version, String::new());
+        let document = |version| OpenDocument::new("a.toml".into(), version, String::new());
         let mut requests = Requests::default();
         requests.put(uri("file:///a"), document(1));
         let (_, _, first) = requests.take().expect("a request");
         for (name, version) in [("file:///b", 1), ("file:///a", 2), ("file:///a", 3)] {
             requests.put(uri(name), document(version));
         }
-        assert!(first.is_cancelled(), "a newer one of the same text came");
+        assert!(first.is_cancelled(), "a newer request replaces it");
         let mut next = || requests.take().map(|(uri, document, _)| (uri.to_string(), document.version));
         assert_eq!(next(), Some(("file:///b".to_owned(), 1)));
         assert_eq!(next(), Some(("file:///a".to_owned(), 3)));

@@ -1,23 +1,23 @@
-//! Hovering and definitions: what is known of the key or name under the cursor.
+//! Hover texts and definitions for the key or name under the cursor.
 
 use std::ops::Range;
 
 use lsp_types::{Hover, HoverContents, MarkupContent, MarkupKind};
 use serde_json::{Value, json};
 
-use super::document::Document;
+use super::document::OpenDocument;
 use crate::scene::keys::key::{Default, KeyInfo, ValueKind};
 use crate::scene::outline::{OutlineKey, OutlineTable};
 
-/// A key under the cursor, with its table, and the key of the table if it is one in braces.
-struct Found<'d> {
+/// The key under the cursor with its table. `outer` differs from `key` in an inline table.
+struct KeyAtCursor<'d> {
     table: &'d OutlineTable,
     outer: &'d OutlineKey,
     key: &'d OutlineKey,
 }
 
-/// The key whose name or value holds a byte.
-fn found(document: &Document, offset: usize) -> Option<Found<'_>> {
+/// The key whose name or value contains a byte offset.
+fn found(document: &OpenDocument, offset: usize) -> Option<KeyAtCursor<'_>> {
     let holds = |key: &&OutlineKey| {
         let reach = |range: &Range<usize>| range.start <= offset && offset <= range.end;
         reach(&key.name.span) || reach(&key.value)
@@ -25,13 +25,13 @@ fn found(document: &Document, offset: usize) -> Option<Found<'_>> {
     document.tables.iter().find_map(|table| {
         let outer = table.keys.iter().find(holds)?;
         let key = outer.inner.iter().find(holds).unwrap_or(outer);
-        Some(Found { table, outer, key })
+        Some(KeyAtCursor { table, outer, key })
     })
 }
 
-/// Description of the key under the cursor.
-pub(super) fn hover(document: &Document, offset: usize) -> Option<Value> {
-    let Found { table, outer, key } = found(document, offset)?;
+/// The hover text of the key under the cursor.
+pub(super) fn hover(document: &OpenDocument, offset: usize) -> Option<Value> {
+    let KeyAtCursor { table, outer, key } = found(document, offset)?;
     let name = key.name.text.as_str();
     let text = if std::ptr::eq(key, outer) {
         match table.known().into_iter().find(|one| one.name == name) {
@@ -73,18 +73,18 @@ pub(super) fn described(key: &KeyInfo) -> String {
     text
 }
 
-/// Keys within the braces of a texture.
+/// Keys of the inline table of a texture.
 pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
     [
         ("texture", "The name of a texture."),
-        ("channel", "The channel that holds numbers: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
-        ("scale", "A color that multiplies the texture, in `emission`."),
+        ("channel", "The channel with the numbers: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
+        ("scale", "A factor on the texture, in `emission`."),
     ]
 }
 
 /// The range where the name under the cursor is defined.
-pub(super) fn definition(document: &Document, offset: usize) -> Option<Value> {
-    let Found { table, outer, key } = found(document, offset)?;
+pub(super) fn definition(document: &OpenDocument, offset: usize) -> Option<Value> {
+    let KeyAtCursor { table, outer, key } = found(document, offset)?;
     let group = if std::ptr::eq(key, outer) {
         table.known().into_iter().find(|one| one.name == key.name.text)?.kind.named_in()?
     } else if key.name.text == "texture" {

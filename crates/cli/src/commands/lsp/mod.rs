@@ -1,7 +1,7 @@
-//! `glimt lsp`: a language server for scenes, over stdin and stdout.
+//! `glimt lsp`: a language server for scenes, on stdin and stdout.
 //!
-//! The client sends a whole text with every change. Each text is parsed at once, which finds what stands in it; the files that it
-//! names are read when it is opened and saved, on one thread for all texts.
+//! The client sends the whole text with every change, and the text is parsed immediately. Referenced files are checked on a
+//! separate thread when the document is opened or saved.
 
 mod colors;
 mod complete;
@@ -34,14 +34,13 @@ use lsp_types::{
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
-use self::document::Document;
+use self::document::OpenDocument;
 use self::files::FileThread;
 use self::wire::{Client, Received};
 use crate::console::Console;
 use crate::exit::Exit;
 
-/// Serves until the client ends it, or its end of stdin is closed. Without a request to shut down before, that it ends is a failure,
-/// as the protocol has it.
+/// Serves until the client sends `exit` or closes stdin. As the protocol requires, `exit` without `shutdown` is a failure.
 pub(crate) fn run(console: &Console) -> Exit {
     match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
         Ok(exit) => exit,
@@ -62,21 +61,21 @@ fn capabilities() -> Value {
     })
 }
 
-/// Part of a server's life.
+/// Phase of the server's lifecycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// The client has not said yet what it can.
+    /// Before `initialize`.
     New,
-    /// It serves.
+    /// Serving requests.
     Serving,
-    /// It waits for its end.
+    /// After `shutdown`, before `exit`.
     ShutDown,
 }
 
 fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
     let documents = Documents::default();
     let (open, to) = (Arc::clone(&documents), client.clone());
-    let publish = move |uri, document: &Document, found| {
+    let publish = move |uri, document: &OpenDocument, found| {
         publish_if_current(&open, |message| to.send(&message), uri, document, found);
     };
     let files = FileThread::start(publish);
@@ -84,7 +83,7 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
     let mut phase = Phase::New;
     while let Some(received) = wire::read(from)? {
         match received {
-            Received::Wrong(answer) => client.refuse(&answer),
+            Received::Invalid(answer) => client.refuse(&answer),
             Received::Message(Message::Request(request)) => {
                 let response = server.respond(request, &mut phase);
                 server.send(&response.into());
@@ -95,25 +94,25 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
                 (_, Phase::Serving) => server.hear(one),
                 (_, Phase::New | Phase::ShutDown) => {}
             },
-            // The server asks nothing.
+            // The server sends no requests, so it expects no responses.
             Received::Message(Message::Response(_)) => {}
         }
     }
     Ok(Exit::DONE)
 }
 
-/// Open texts by their addresses.
-type Documents = Arc<Mutex<HashMap<String, Document>>>;
+/// Open documents by URI.
+type Documents = Arc<Mutex<HashMap<String, OpenDocument>>>;
 
 struct Server<'c> {
     client: &'c Client,
     documents: Documents,
-    /// Reads files. `None` without a thread for it: then the mistakes of the texts alone are shown.
+    /// Checks files. `None` if the thread could not be started; then only errors in texts are reported.
     files: Option<FileThread>,
 }
 
 impl Server<'_> {
-    fn documents(&self) -> MutexGuard<'_, HashMap<String, Document>> {
+    fn documents(&self) -> MutexGuard<'_, HashMap<String, OpenDocument>> {
         self.documents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -121,7 +120,7 @@ impl Server<'_> {
         self.client.send(message);
     }
 
-    /// The answer to a request in a phase, which it may change.
+    /// Responds to a request, and updates the phase.
     fn respond(&self, request: Request, phase: &mut Phase) -> Response {
         let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
         match (request.method.as_str(), *phase) {
@@ -130,19 +129,21 @@ impl Server<'_> {
                 Response::new_ok(request.id, capabilities())
             }
             (_, Phase::New) => {
-                refused(request.id, ErrorCode::ServerNotInitialized, "`initialize` comes first")
+                refused(request.id, ErrorCode::ServerNotInitialized, "`initialize` must be the first request")
             }
             (Initialize::METHOD, Phase::Serving) => {
-                refused(request.id, ErrorCode::InvalidRequest, "the server is initialized already")
+                refused(request.id, ErrorCode::InvalidRequest, "the server is already initialized")
             }
             (Shutdown::METHOD, Phase::Serving) => {
                 *phase = Phase::ShutDown;
                 Response::new_ok(request.id, Value::Null)
             }
             (_, Phase::Serving) => self.answer(request),
-            (_, Phase::ShutDown) => {
-                refused(request.id, ErrorCode::InvalidRequest, "the server is shut down and waits for `exit`")
-            }
+            (_, Phase::ShutDown) => refused(
+                request.id,
+                ErrorCode::InvalidRequest,
+                "the server is shut down; only `exit` is allowed",
+            ),
         }
     }
 
@@ -165,16 +166,16 @@ impl Server<'_> {
         }
     }
 
-    /// The answer of a function about a place in a document. `None` if it has none.
-    fn at(&self, params: Value, look: impl FnOnce(&Document, usize) -> Option<Value>) -> Option<Value> {
+    /// Calls a function with a document and a byte offset. `None` if the document is not open.
+    fn at(&self, params: Value, look: impl FnOnce(&OpenDocument, usize) -> Option<Value>) -> Option<Value> {
         let TextDocumentPositionParams { text_document, position } = serde_json::from_value(params).ok()?;
         let documents = self.documents();
         let document = documents.get(text_document.uri.as_str())?;
         look(document, document.offset(position))
     }
 
-    /// The answer of a function about a document. `None` if the document is not open.
-    fn on(&self, params: &Value, look: impl FnOnce(&Document) -> Value) -> Option<Value> {
+    /// Calls a function with a document. `None` if the document is not open.
+    fn on(&self, params: &Value, look: impl FnOnce(&OpenDocument) -> Value) -> Option<Value> {
         let uri = params["textDocument"]["uri"].as_str()?;
         self.documents().get(uri).map(look)
     }
@@ -192,7 +193,9 @@ impl Server<'_> {
                 if let Some(DidChangeTextDocumentParams { text_document, mut content_changes }) = read(params)
                 {
                     if content_changes.iter().any(|change| change.range.is_some()) {
-                        self.note("a change of a range is left out: this server takes whole texts");
+                        self.note(
+                            "ignored an incremental change: this server needs full text synchronization",
+                        );
                     } else if let Some(last) = content_changes.pop() {
                         self.put(&text_document.uri, text_document.version, last.text);
                     }
@@ -213,35 +216,35 @@ impl Server<'_> {
         }
     }
 
-    /// Writes an error into the client's log.
+    /// Writes an error to the client's log.
     fn note(&self, message: &str) {
         let params = LogMessageParams { typ: MessageType::ERROR, message: message.to_owned() };
         self.send(&Notification::new(LogMessage::METHOD.to_owned(), params).into());
     }
 
-    /// Takes a text, and says what is wrong in it.
+    /// Stores a text and publishes its diagnostics.
     fn put(&self, uri: &Uri, version: i32, text: String) {
-        let document = Document::new(path(uri), version, text);
+        let document = OpenDocument::new(path(uri), version, text);
         let found = diagnostics::of_text(&document);
         self.documents().insert(uri.as_str().to_owned(), document);
         self.send(&published(uri.clone(), Some(version), found));
     }
 
-    /// Has the files be read that a text names.
+    /// Queues a check of the files referenced by a document.
     fn read_files(&self, uri: &Uri) {
         let document = self.documents().get(uri.as_str()).cloned();
         if let (Some(files), Some(document)) = (&self.files, document) {
-            files.read(uri.clone(), document);
+            files.check(uri.clone(), document);
         }
     }
 }
 
-/// Says what is wrong with a text and its files, unless the text is another by now.
+/// Publishes the diagnostics of a document and its files, unless the document has changed.
 fn publish_if_current(
     documents: &Documents,
     send: impl FnOnce(Message),
     uri: Uri,
-    document: &Document,
+    document: &OpenDocument,
     found: Vec<Diagnostic>,
 ) {
     let documents = documents.lock().unwrap_or_else(PoisonError::into_inner);
@@ -254,17 +257,17 @@ fn read<P: DeserializeOwned>(params: Value) -> Option<P> {
     serde_json::from_value(params).ok()
 }
 
-/// The message with all mistakes of a text.
+/// The notification with all diagnostics of a document.
 fn published(uri: Uri, version: Option<i32>, diagnostics: Vec<Diagnostic>) -> Message {
     let params = PublishDiagnosticsParams { uri, diagnostics, version };
     Notification::new(PublishDiagnostics::METHOD.to_owned(), params).into()
 }
 
 fn unknown(id: RequestId, method: &str) -> Response {
-    Response::new_err(id, ErrorCode::MethodNotFound as i32, format!("{method} is not served"))
+    Response::new_err(id, ErrorCode::MethodNotFound as i32, format!("unsupported method {method}"))
 }
 
-/// The path of a file by its address; other addresses have a path that no file has.
+/// The path of a file URI. Other URIs give a path that does not exist.
 fn path(uri: &Uri) -> PathBuf {
     let decoded = uri.path().as_estr().decode().into_string();
     decoded.map_or_else(|_| PathBuf::from(uri.as_str()), |path| PathBuf::from(path.into_owned()))

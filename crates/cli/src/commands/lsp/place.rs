@@ -1,20 +1,20 @@
-//! The place of the cursor in a text that may be broken just there: found by lines, as a person reads them.
+//! Determines the context of the cursor. Works line by line, as the text may have syntax errors while it is typed.
 
 use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
 use crate::scene::keys::table;
 
-/// A place where something may be typed.
+/// What can be completed at the cursor.
 #[derive(Debug)]
-pub(super) enum Place {
-    /// A header, or a line on which one may begin.
+pub(super) enum CursorContext {
+    /// A header, or an empty line where one can start.
     Header,
-    /// A key of a table; those that the table has already, and whether its `=` is there.
+    /// A key of a table, with the keys already given and whether `=` follows.
     Key { of: Section, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
     Value { of: Section, key: String, is_quoted: bool },
-    /// A key in the braces of a value.
+    /// A key in an inline table.
     InnerKey { given: Vec<String> },
-    /// The value of a key in the braces of a value.
+    /// The value of a key in an inline table.
     InnerValue { key: String, is_quoted: bool },
 }
 
@@ -26,7 +26,7 @@ pub(super) struct Section {
 }
 
 impl Section {
-    /// Its keys.
+    /// The keys allowed in the table.
     pub(super) fn keys(&self) -> Vec<&'static KeyInfo> {
         self.info.keys_of(self.kind).collect()
     }
@@ -36,20 +36,20 @@ impl Section {
     }
 }
 
-/// The place of a byte. `None` in comments, in arrays, and in tables that scenes do not have.
-pub(super) fn place(text: &str, offset: usize) -> Option<Place> {
+/// The context at a byte offset. `None` in comments, arrays and unknown tables.
+pub(super) fn place(text: &str, offset: usize) -> Option<CursorContext> {
     let before = text.get(..offset)?;
     let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
     let trimmed = line.trim_start();
-    let around = Around::of(text, offset);
+    let around = Surroundings::of(text, offset);
     if Scan::of(line).is_comment || around.is_in_array {
         return None;
     }
     if trimmed.starts_with('[') && !trimmed.contains(']') {
-        return Some(Place::Header);
+        return Some(CursorContext::Header);
     }
     let Some((header, body)) = around.table else {
-        return (!trimmed.contains('=')).then_some(Place::Header);
+        return (!trimmed.contains('=')).then_some(CursorContext::Header);
     };
     let after = text[offset..].split('\n').next().unwrap_or_default();
     let mut parts = header.split('.');
@@ -63,14 +63,14 @@ pub(super) fn place(text: &str, offset: usize) -> Option<Place> {
     in_table(info, body, (line, after), false)
 }
 
-/// The place in a table whose lines, or items in braces, are `body`; the texts are those before and behind the cursor. `None` in
-/// arrays, and behind values that are whole.
+/// The context in a table. `body` has its lines, or the items of an inline table; the tuple has the text before and after the
+/// cursor. `None` in arrays and after complete values.
 fn in_table(
     info: &'static TableInfo,
     body: &str,
     (typed, after): (&str, &str),
     is_inline: bool,
-) -> Option<Place> {
+) -> Option<CursorContext> {
     let of = Section { info, kind: kind(info, body) };
     let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
     if opened > closed {
@@ -80,24 +80,24 @@ fn in_table(
     let Some((key, value)) = current.split_once('=') else {
         let is_assigned =
             after.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').trim_start().starts_with('=');
-        return Some(Place::Key { of, given: given(body, current.trim()), is_assigned });
+        return Some(CursorContext::Key { of, given: given(body, current.trim()), is_assigned });
     };
     let is_whole = !is_in_quotes(value) && value.contains(['"', '\'']);
     let is_open = !(is_whole || value.contains('['));
-    is_open.then(|| Place::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) })
+    is_open.then(|| CursorContext::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) })
 }
 
-fn inner(typed: &str) -> Place {
+fn inner(typed: &str) -> CursorContext {
     let current = last_item(typed);
     match current.split_once('=') {
         Some((key, value)) => {
-            Place::InnerValue { key: key.trim().to_owned(), is_quoted: is_in_quotes(value) }
+            CursorContext::InnerValue { key: key.trim().to_owned(), is_quoted: is_in_quotes(value) }
         }
-        None => Place::InnerKey { given: given(&typed.replace(',', "\n"), current.trim()) },
+        None => CursorContext::InnerKey { given: given(&typed.replace(',', "\n"), current.trim()) },
     }
 }
 
-/// The typed part of the last item; commas within brackets end none.
+/// The last item of a comma-separated list. Ignores commas within brackets.
 fn last_item(typed: &str) -> &str {
     let mut depth = 0_i32;
     let mut start = 0;
@@ -116,13 +116,13 @@ fn is_in_quotes(value: &str) -> bool {
     Scan::of(value).quote.is_some()
 }
 
-/// State at the end of a line: open string, comment, open brackets.
+/// The state at the end of a line: open string, comment and brackets.
 #[derive(Clone, Copy, Debug, Default)]
 struct Scan {
-    /// The quote of a string that is open.
+    /// The quote of an open string.
     quote: Option<char>,
     is_comment: bool,
-    /// Opened brackets, less the closed ones.
+    /// Number of opened minus closed brackets.
     brackets: i32,
 }
 
@@ -150,21 +150,21 @@ impl Scan {
     }
 }
 
-/// Surroundings of a byte of a text: its table, and whether it is in an array.
+/// The table around a byte offset, and whether it is in an array.
 #[derive(Debug, Default)]
-struct Around<'t> {
-    /// The header above, without its brackets, and the lines of its table. `None` above the first header.
+struct Surroundings<'t> {
+    /// The previous header without its brackets, and the lines of its table. `None` before the first header.
     table: Option<(&'t str, &'t str)>,
-    /// Whether the line goes on with an array that begins above it.
+    /// Whether the line continues an array.
     is_in_array: bool,
 }
 
-impl<'t> Around<'t> {
+impl<'t> Surroundings<'t> {
     fn of(text: &'t str, offset: usize) -> Self {
         let (mut around, mut header) = (Self::default(), None);
         let (mut at, mut open) = (0, 0);
         for line in text.split_inclusive('\n') {
-            // A line that cannot be a part of an array ends one that nobody has closed.
+            // A key or a header ends an unclosed array.
             if is_key(line) || header_name(line).is_some() {
                 open = 0;
             }
@@ -172,28 +172,28 @@ impl<'t> Around<'t> {
             let is_here = start <= offset && (offset < end || end == text.len() && !line.ends_with('\n'));
             around.is_in_array |= is_here && open > 0;
             match header_name(line).filter(|_| open == 0 && !is_here) {
-                // The next table begins.
+                // Stop at the next table.
                 Some(_) if offset < start => break,
                 Some(name) => header = Some((name, end)),
                 None => open = (open + Scan::of(line).brackets).max(0),
             }
             at = end;
         }
-        // A text that ends with a line end has one more line.
+        // A text that ends with a newline has one more, empty line.
         around.is_in_array |= offset == text.len() && (text.is_empty() || text.ends_with('\n')) && open > 0;
         around.table = header.map(|(name, end)| (name, &text[end..at]));
         around
     }
 }
 
-/// Whether a line begins with a key and its `=`.
+/// Whether a line starts with a key and `=`.
 fn is_key(line: &str) -> bool {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
     let rest = line.trim_start().trim_start_matches(is_bare);
     rest.trim_start().starts_with('=')
 }
 
-/// The name in the brackets of a header. `None` for a line that is none, such as `[1, 0],` in an array.
+/// The name in a header. `None` for other lines, such as `[1, 0],` in an array.
 fn header_name(line: &str) -> Option<&str> {
     let (name, rest) = line.trim_start().strip_prefix('[')?.trim_start_matches('[').split_once(']')?;
     let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '"' | '\'' | ' ');
@@ -203,7 +203,7 @@ fn header_name(line: &str) -> Option<&str> {
     (is_name && (rest.is_empty() || rest.starts_with('#'))).then(|| name.trim())
 }
 
-/// The type of a table by its `type`, or the default.
+/// The type given by the key `type`, or the default.
 fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
@@ -212,13 +212,13 @@ fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     info.type_of(named).or_else(|| info.type_of(None))
 }
 
-/// The text of the first string of a value.
+/// The content of the first string in a value.
 fn in_quotes(value: &str) -> Option<&str> {
     let (_, rest) = value.split_once(['"', '\''])?;
     Some(rest.split(['"', '\'']).next().unwrap_or(rest))
 }
 
-/// Keys that lines have, but for the one that is typed.
+/// The keys in `body`, except the one being typed.
 fn given(body: &str, typed: &str) -> Vec<String> {
     let keys = body.lines().filter_map(|line| line.split_once('=')).map(|(key, _)| key.trim().to_owned());
     keys.filter(|key| key != typed).collect()
@@ -228,24 +228,25 @@ fn given(body: &str, typed: &str) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// The place of `|` in a text.
-    fn at(text: &str) -> Option<Place> {
+    /// The context at `|` in a text.
+    fn at(text: &str) -> Option<CursorContext> {
         let offset = text.find('|').expect("a cursor");
         place(&text.replace('|', ""), offset)
     }
 
     #[test]
-    fn a_place_is_known_in_texts_that_are_being_typed() {
-        assert!(matches!(at("|"), Some(Place::Header)));
-        assert!(matches!(at("[ren|"), Some(Place::Header)));
+    fn incomplete_texts_have_a_context() {
+        assert!(matches!(at("|"), Some(CursorContext::Header)));
+        assert!(matches!(at("[ren|"), Some(CursorContext::Header)));
         assert!(at("# [ren|").is_none() && at("[render]\nwidth = 3 # so|").is_none());
-        let Some(Place::Key { of, given, .. }) =
+        let Some(CursorContext::Key { of, given, .. }) =
             at("[render]\nwidth = 3\nhe|\nseed = 1\n\n[camera]\nup = [0, 1, 0]\n")
         else {
             panic!()
         };
         assert_eq!((of.info.name, given), ("render", vec!["width".to_owned(), "seed".to_owned()]));
-        let Some(Place::Value { of, key, is_quoted }) = at("[[light]]\ntype = \"spot\"\nfalloff = \"|\n")
+        let Some(CursorContext::Value { of, key, is_quoted }) =
+            at("[[light]]\ntype = \"spot\"\nfalloff = \"|\n")
         else {
             panic!()
         };
@@ -254,25 +255,27 @@ mod tests {
     }
 
     #[test]
-    fn braces_hold_tables_and_textures() {
+    fn inline_tables_have_a_context() {
         for text in [
             "[materials]\nwall = { type = \"metal\", color = 0.5, ro| }",
             "[materials]\nwall = { ro|, type = 'metal', color = 0.5 }",
         ] {
-            let Some(Place::Key { of, mut given, .. }) = at(text) else { panic!("{text}") };
+            let Some(CursorContext::Key { of, mut given, .. }) = at(text) else { panic!("{text}") };
             given.sort();
             assert_eq!(
                 (of.kind.map(|kind| kind.name), given),
                 (Some("metal"), vec!["color".to_owned(), "type".to_owned()])
             );
         }
-        let Some(Place::InnerValue { key, is_quoted }) = at("[materials.a]\ndiffuse = { texture = \"|\" }")
+        let Some(CursorContext::InnerValue { key, is_quoted }) =
+            at("[materials.a]\ndiffuse = { texture = \"|\" }")
         else {
             panic!()
         };
         assert_eq!((key.as_str(), is_quoted), ("texture", true));
-        assert!(matches!(at("[materials]\na = { diffuse = { |"), Some(Place::InnerKey { .. })));
-        let Some(Place::Value { key, .. }) = at("[materials]\na = { diffuse = [1, 2, 3], emission = |")
+        assert!(matches!(at("[materials]\na = { diffuse = { |"), Some(CursorContext::InnerKey { .. })));
+        let Some(CursorContext::Value { key, .. }) =
+            at("[materials]\na = { diffuse = [1, 2, 3], emission = |")
         else {
             panic!()
         };
@@ -280,9 +283,9 @@ mod tests {
     }
 
     #[test]
-    fn comments_hide_neither_types_nor_headers() {
+    fn comments_are_ignored() {
         let kind = |text: &str| match at(text) {
-            Some(Place::Key { of, .. }) => (of.info.name, of.kind.map(|kind| kind.name)),
+            Some(CursorContext::Key { of, .. }) => (of.info.name, of.kind.map(|kind| kind.name)),
             _ => panic!("{text}"),
         };
         assert_eq!(
@@ -294,17 +297,17 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_typed_in_arrays_and_behind_values() {
+    fn arrays_and_complete_values_have_no_context() {
         assert!(at("[materials.a]\ndiffuse = [1, |").is_none());
         assert!(at("[render]\nintegrator = \"path\" |").is_none());
-        let is_assigned = |text: &str| matches!(at(text), Some(Place::Key { is_assigned: true, .. }));
+        let is_assigned = |text: &str| matches!(at(text), Some(CursorContext::Key { is_assigned: true, .. }));
         assert!(is_assigned("[[sphere]]\nrad| = 0.5") && is_assigned("[[sphere]]\nra|dius = 0.5"));
         assert!(!is_assigned("[[sphere]]\nrad|"));
     }
 
     #[test]
-    fn arrays_over_lines_have_no_keys_and_are_no_headers() {
-        let Some(Place::Key { of, given, .. }) =
+    fn multiline_arrays_are_skipped() {
+        let Some(CursorContext::Key { of, given, .. }) =
             at("[[mesh]]\nmatrix = [\n[1, 0],\n]\nsmo|\nmaterial = [\n[2],\n]\nscale = 1\n[camera]\nfov = 4")
         else {
             panic!()
@@ -319,9 +322,12 @@ mod tests {
         ] {
             assert!(at(text).is_none(), "{text}");
         }
-        // An array that is not closed ends with the next key or header.
+        // An unclosed array ends at the next key or header.
         for text in ["[camera]\nup = [0, 1\nfov = 40\nap|", "[render]\nbackground = [0, 1\n[camera]\nap|"] {
-            assert!(matches!(at(text), Some(Place::Key { of, .. }) if of.info.name == "camera"), "{text}");
+            assert!(
+                matches!(at(text), Some(CursorContext::Key { of, .. }) if of.info.name == "camera"),
+                "{text}"
+            );
         }
     }
 }

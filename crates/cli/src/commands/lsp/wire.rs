@@ -1,7 +1,7 @@
-//! Messages over stdin and stdout: a header with a length, then JSON (the base protocol of LSP).
+//! The base protocol of LSP on stdin and stdout: a header with a length, followed by JSON.
 //!
-//! `lsp_server`'s own reader ends at what is not a message, and allocates whatever length a header names. This one answers the former
-//! and refuses the latter.
+//! `lsp_server`'s own reader stops at invalid messages, and allocates the length given in the header. This one responds with an
+//! error, and limits the length.
 
 use std::io::{self, BufRead, Read, Write};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -9,30 +9,30 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lsp_server::{ErrorCode, Message};
 use serde_json::{Value, json};
 
-/// Most bytes of a message: those of the longest scene, each of them escaped.
-const MOST: u64 = 6 << 27;
+/// Most bytes of a message: enough for the largest scene with every byte escaped.
+const MAX_MESSAGE_BYTES: u64 = 6 << 27;
 /// Most bytes of a header.
-const HEADER: u64 = 1 << 14;
+const MAX_HEADER_BYTES: u64 = 1 << 14;
 
-/// Something that a client sent.
+/// A frame from the client.
 #[derive(Debug)]
 pub(super) enum Received {
-    /// A message.
+    /// A valid message.
     Message(Message),
-    /// A frame without a message in it, and the answer to it.
-    Wrong(Value),
+    /// An invalid message, with the error response.
+    Invalid(Value),
 }
 
 /// Reads the next frame. `None` at the end of the stream.
 ///
 /// # Errors
-/// The stream cannot be read on: its frames are lost.
+/// The stream cannot be read or has lost its framing.
 pub(super) fn read(from: &mut impl BufRead) -> Result<Option<Received>, String> {
     let Some(length) = length(from)? else { return Ok(None) };
-    if length > MOST {
-        return Err(format!("a message of {length} bytes is too long; {MOST} are read at most"));
+    if length > MAX_MESSAGE_BYTES {
+        return Err(format!("a message of {length} bytes is too long; the limit is {MAX_MESSAGE_BYTES}"));
     }
-    // Memory is taken as bytes arrive.
+    // Allocate as bytes arrive.
     let mut bytes = Vec::new();
     from.by_ref().take(length).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     if (bytes.len() as u64) < length {
@@ -43,7 +43,7 @@ pub(super) fn read(from: &mut impl BufRead) -> Result<Option<Received>, String> 
 
 /// Reads a header. `None` if the stream ends before it.
 fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
-    let mut header = from.by_ref().take(HEADER);
+    let mut header = from.by_ref().take(MAX_HEADER_BYTES);
     let mut length = None;
     let mut is_first = true;
     loop {
@@ -62,16 +62,16 @@ fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
             return length.map(Some).ok_or_else(|| "a header has no Content-Length".to_owned());
         }
         let Some((name, value)) = text.split_once(':') else {
-            return Err(format!("this is no header: {:?}", text.chars().take(60).collect::<String>()));
+            return Err(format!("invalid header: {:?}", text.chars().take(60).collect::<String>()));
         };
         if name.trim().eq_ignore_ascii_case("Content-Length") {
             let number = value.trim().parse();
-            length = Some(number.map_err(|_| format!("Content-Length is no length: {:?}", value.trim()))?);
+            length = Some(number.map_err(|_| format!("invalid Content-Length: {:?}", value.trim()))?);
         }
     }
 }
 
-/// The message of a frame.
+/// Parses the content of a frame.
 fn message(bytes: Vec<u8>) -> Received {
     let text = String::from_utf8(bytes).map_err(|_| "the message is not UTF-8".to_owned());
     let json = text.and_then(|text| {
@@ -81,23 +81,23 @@ fn message(bytes: Vec<u8>) -> Received {
     });
     let json = match json {
         Ok(json) => json,
-        Err(why) => return Received::Wrong(refusal(&Value::Null, ErrorCode::ParseError, &why)),
+        Err(why) => return Received::Invalid(refusal(&Value::Null, ErrorCode::ParseError, &why)),
     };
     let id = json.get("id").filter(|id| id.is_string() || id.is_number()).cloned().unwrap_or_default();
     match serde_json::from_value(json) {
         Ok(message) => Received::Message(message),
         Err(_) => {
-            Received::Wrong(refusal(&id, ErrorCode::InvalidRequest, "this is no request and no notification"))
+            Received::Invalid(refusal(&id, ErrorCode::InvalidRequest, "neither a request nor a notification"))
         }
     }
 }
 
-/// An answer that refuses something. The id is null if it is not known.
+/// An error response. `id` is null if it is unknown.
 fn refusal(id: &Value, code: ErrorCode, why: &str) -> Value {
     json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code as i32, "message": why } })
 }
 
-/// JSON in which U+FFFD stands for escaped surrogates without a partner, which editors send while a character is half there.
+/// Replaces unpaired escaped surrogates by U+FFFD. Editors send them while a character is being typed.
 fn paired(text: &str) -> String {
     let surrogate = |at: usize| {
         let digits = text.get(at..)?.strip_prefix("\\u")?.get(..4)?;
@@ -111,7 +111,7 @@ fn paired(text: &str) -> String {
         let (taken, length) = match (first, second) {
             (Some(0xd800..0xdc00), Some(0xdc00..)) => (text.get(found..found + 12), 12),
             (Some(_), _) => (Some("\\ufffd"), 6),
-            // A backslash and what it escapes.
+            // Copy a backslash with the character that it escapes.
             (None, _) => {
                 let next = text[found + 1..].chars().next().map_or(0, char::len_utf8);
                 (text.get(found..found + 1 + next), 1 + next)
@@ -124,7 +124,7 @@ fn paired(text: &str) -> String {
     out
 }
 
-/// The client's end, which threads share.
+/// The connection to the client, shared between threads.
 #[derive(Clone)]
 pub(super) struct Client(Arc<Mutex<Box<dyn Write + Send>>>);
 
@@ -133,18 +133,18 @@ impl Client {
         Self(Arc::new(Mutex::new(Box::new(to))))
     }
 
-    /// Sends a message. A client that is gone hears nothing.
+    /// Sends a message. Ignores a closed connection.
     pub(super) fn send(&self, message: &Message) {
         let _ = message.write(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Sends the answer to a frame without a message.
+    /// Sends an error response.
     pub(super) fn refuse(&self, answer: &Value) {
         let mut to = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let text = answer.to_string();
         let written: io::Result<()> =
             write!(to, "Content-Length: {}\r\n\r\n{text}", text.len()).and_then(|()| to.flush());
-        // A client that is gone hears nothing.
+        // Ignore a closed connection.
         drop(written);
     }
 }
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn surrogates_without_a_partner_become_the_replacement_character() {
+    fn unpaired_surrogates_are_replaced() {
         for (text, wanted) in [
             (r#""a\ud83db""#, "a\u{fffd}b"),
             (r#""\ud83d\ude00""#, "😀"),
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_length_that_nobody_sends_takes_no_memory() {
+    fn excessive_lengths_are_rejected() {
         let mut far = &b"Content-Length: 1000000000000\r\n\r\n{}"[..];
         assert!(read(&mut far).expect_err("too long").contains("1000000000000 bytes"));
         let mut cut = &b"Content-Length: 500000000\r\n\r\n{}"[..];

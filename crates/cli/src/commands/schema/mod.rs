@@ -1,7 +1,7 @@
-//! The JSON Schema of a scene file, made from the definition of its keys.
+//! The JSON Schema of scene files, generated from the definitions of their keys.
 //!
-//! Draft 4 is for editors by Taplo, which knows no later conditions; there a material or light may have the keys of all types, and
-//! a dependency ties each key to its types. In draft 2020-12 each type has a schema of its own.
+//! Draft 4 is for editors with Taplo, which does not support `if`: there, a material or light allows the keys of all types, with
+//! dependencies that tie each key to its types. In draft 2020-12, each type has its own schema.
 
 mod value;
 
@@ -14,10 +14,10 @@ use crate::exit::Exit;
 use crate::scene::keys::key::{Default, Form, KeyInfo, TableInfo, TypeInfo};
 use crate::scene::keys::tables;
 
-/// The name of the schema beside scenes.
+/// The file name of the schema.
 pub const FILE: &str = "glimt.schema.json";
 
-/// The line that begins a scene and leads an editor to the schema beside it.
+/// The first line of a scene that references the schema in the same folder.
 pub const LINE: &str = "#:schema glimt.schema.json\n";
 
 /// Prints the schema.
@@ -26,12 +26,12 @@ pub(crate) fn run(draft: Draft, console: &Console) -> Exit {
     Exit::DONE
 }
 
-/// The schema as a file has it.
+/// The schema as formatted text.
 pub fn text(draft: Draft) -> String {
     format!("{:#}\n", schema(draft))
 }
 
-/// The schema.
+/// Generates the schema.
 pub fn schema(draft: Draft) -> Value {
     let properties: Map<String, Value> =
         tables().iter().map(|info| (info.name.to_owned(), in_file(info, draft))).collect();
@@ -48,7 +48,7 @@ pub fn schema(draft: Draft) -> Value {
     schema
 }
 
-/// A table as the file holds it: once, by names, or in a list.
+/// The schema of a top-level key: a table, named tables or a list of tables.
 fn in_file(info: &'static TableInfo, draft: Draft) -> Value {
     let one = table(info, draft);
     let mut all = match info.form {
@@ -72,25 +72,25 @@ fn table(info: &'static TableInfo, draft: Draft) -> Value {
     table
 }
 
-/// An object with these keys and no others.
+/// The schema of an object with exactly these keys.
 fn object(keys: &[&'static KeyInfo], draft: Draft, of: impl Fn(&'static KeyInfo) -> Value) -> Value {
     let properties: Map<String, Value> = keys.iter().map(|key| (key.name.to_owned(), of(key))).collect();
     let is_required = |key: &&&KeyInfo| matches!(key.default, Default::Required(_)) && !is_conditional(key);
     let required: Vec<&str> = keys.iter().filter(is_required).map(|key| key.name).collect();
     let mut object = json!({ "type": "object", "properties": properties, "additionalProperties": false });
-    // Draft 4 has no empty list of them.
+    // Draft 4 does not allow an empty list.
     if !required.is_empty() || draft == Draft::Latest {
         object["required"] = required.into();
     }
     object
 }
 
-/// Whether another key may stand in its place.
+/// Whether another key may replace it.
 fn is_conditional(key: &KeyInfo) -> bool {
     matches!(key.name, "position" | "look_at")
 }
 
-/// A key's values, with its description and default.
+/// The schema of a key's value, with its description and default.
 fn described(key: &KeyInfo, draft: Draft) -> Value {
     let mut schema = value(key.kind, draft);
     schema["description"] = description(key).into();
@@ -102,7 +102,7 @@ fn described(key: &KeyInfo, draft: Draft) -> Value {
     schema
 }
 
-/// Description, unit, range and default in words.
+/// Description, unit, range and default as Markdown.
 fn description(key: &KeyInfo) -> String {
     let named =
         |name: &str, text: String| if text.is_empty() { text } else { format!("\n\n{name}: {text}.") };
@@ -114,7 +114,7 @@ fn description(key: &KeyInfo) -> String {
     format!("{}.{}{}{default}", key.doc, named("Unit", key.unit.to_owned()), named("Range", key.range()))
 }
 
-/// A table whose keys depend on its type, each type by itself.
+/// The schema of a table with types, as one condition per type.
 fn by_type(info: &'static TableInfo) -> Value {
     let draft = Draft::Latest;
     let conditions: Vec<Value> = info
@@ -133,21 +133,21 @@ fn by_type(info: &'static TableInfo) -> Value {
     json!({ "type": "object", "properties": { "type": types(info) }, "allOf": conditions })
 }
 
-/// Whether a table is of a type; the default type needs no `type`.
+/// The condition that a table has a type. The key `type` is optional for the default type.
 fn is_of(info: &TableInfo, kind: &TypeInfo) -> Value {
     let is_default = info.types.first().is_some_and(|first| first.name == kind.name);
     let required: &[&str] = if is_default { &[] } else { &["type"] };
     json!({ "properties": { "type": { "enum": [kind.name] } }, "required": required })
 }
 
-/// The key `type`.
+/// The schema of the key `type`.
 fn types(info: &TableInfo) -> Value {
     let names: Vec<&str> = info.types.iter().map(|kind| kind.name).collect();
     let docs: Vec<String> = info.types.iter().map(|kind| format!("`{}`: {}", kind.name, kind.doc)).collect();
     json!({ "type": "string", "enum": names, "default": names.first(), "description": docs.join("\n\n") })
 }
 
-/// A table with the keys of all types, where each key depends on a type that has it.
+/// The schema of a table with the keys of all types, where each key depends on a type that has it.
 fn of_all_types(info: &'static TableInfo) -> Value {
     let draft = Draft::Four;
     let (mut properties, mut dependencies) = (Map::new(), Map::new());
@@ -168,7 +168,7 @@ fn of_all_types(info: &'static TableInfo) -> Value {
     table
 }
 
-/// One schema for a key that several types have: any of their values.
+/// The schema of a key that several types have, which accepts the values of all.
 fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let draft = Draft::Four;
     let mut values: Vec<Value> = keys.iter().map(|(_, key)| value(key.kind, draft)).collect();
@@ -183,7 +183,7 @@ fn merged(keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     schema
 }
 
-/// The types that a key asks for.
+/// The dependency of a key on its types.
 fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) -> Value {
     let names: Vec<&str> = keys.iter().map(|(kind, _)| kind.name).collect();
     let has_default = info.types.first().is_some_and(|first| names.contains(&first.name));
@@ -194,7 +194,7 @@ fn dependency(info: &TableInfo, keys: &[(&'static TypeInfo, &'static KeyInfo)]) 
     schema
 }
 
-/// Conditions between the keys of a table, which no list of keys says.
+/// Conditions between the keys of a table.
 fn conditions(table: &str, draft: Draft) -> Vec<(&'static str, Value)> {
     let none_of = |names: &[&str]| {
         let each: Vec<Value> = names.iter().map(|name| json!({ "required": [name] })).collect();

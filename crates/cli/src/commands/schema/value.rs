@@ -10,7 +10,7 @@ use crate::scene::keys::color_names;
 use crate::scene::keys::key::ValueKind;
 use crate::scene::keys::limits::Limits;
 
-/// The schema of a kind of values.
+/// The schema of a value type.
 pub(super) fn value(kind: ValueKind, draft: Draft) -> Value {
     match kind {
         ValueKind::Whole(least, most) => json!({ "type": "integer", "minimum": least, "maximum": most }),
@@ -26,7 +26,7 @@ pub(super) fn value(kind: ValueKind, draft: Draft) -> Value {
             }
             schema
         }
-        // Shapes are also known by their numbers.
+        // Shapes can also be referred to by number, so names must not be numbers.
         ValueKind::Text => json!({ "type": "string", "pattern": "[^0-9]" }),
         ValueKind::File(endings) => file(endings),
         ValueKind::Color(limits) => json!({ "anyOf": colors(limits, draft) }),
@@ -77,23 +77,23 @@ fn numbers(count: usize, limits: Limits, draft: Draft) -> Value {
     json!({ "type": "array", "items": number(limits, draft), "minItems": count, "maxItems": count })
 }
 
-/// The forms of a color.
+/// The schemas of a color.
 fn colors(limits: Limits, draft: Draft) -> Vec<Value> {
     let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
     vec![number(limits, draft), numbers(3, limits, draft), written]
 }
 
-/// A color as a text.
+/// The schema of a color string.
 pub(super) fn written_color() -> Value {
     let mut names: Vec<&str> = color_names().collect();
     names.sort_unstable();
     json!({
-        "description": "An sRGB color: `#rrggbb`, or the name that CSS has for it, in any case.",
+        "description": "An sRGB color: `#rrggbb` or a CSS color name, in any case.",
         "anyOf": [{ "enum": names }, { "type": "string", "pattern": color_pattern(&names) }],
     })
 }
 
-/// `#rrggbb`, or a name in any case.
+/// A pattern for `#rrggbb` and color names in any case.
 fn color_pattern(names: &[&str]) -> String {
     let in_any_case =
         |text: &str| text.chars().map(|c| format!("[{}{c}]", c.to_ascii_uppercase())).collect::<String>();
@@ -101,7 +101,7 @@ fn color_pattern(names: &[&str]) -> String {
     format!("^(#[0-9A-Fa-f]{{6}}|{})$", names.join("|"))
 }
 
-/// A path by its ending, in any case.
+/// The schema of a path with one of these extensions, in any case.
 fn file(endings: &[&str]) -> Value {
     let in_any_case = |ending: &&str| {
         ending
@@ -122,7 +122,7 @@ fn file(endings: &[&str]) -> Value {
     json!({ "type": "string", "pattern": format!("\\.({})$", endings.join("|")) })
 }
 
-/// `{ texture = "name" }`, with these further keys.
+/// The schema of `{ texture = "name" }` with additional keys.
 fn texture(more: Value) -> Value {
     let mut properties = more;
     properties["texture"] =
@@ -130,9 +130,9 @@ fn texture(more: Value) -> Value {
     json!({ "type": "object", "properties": properties, "required": ["texture"], "additionalProperties": false })
 }
 
-/// `{ texture = "name", channel = "r" }`.
+/// The schema of `{ texture = "name", channel = "r" }`.
 fn channel() -> Value {
     let names: Vec<&str> = Channel::ALL.iter().map(|channel| channel.name()).collect();
-    let doc = "The channel that holds the numbers; without it, luminance, or alpha for opacity.";
+    let doc = "The channel with the numbers. The default is luminance, or alpha for opacity.";
     texture(json!({ "channel": { "type": "string", "enum": names, "description": doc } }))
 }

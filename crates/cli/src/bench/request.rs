@@ -1,0 +1,119 @@
+//! Requests for a benchmark, its events and its errors.
+
+use std::path::PathBuf;
+
+use super::methods::Toggles;
+use super::results::Results;
+use crate::pipeline::protocol::Failure;
+use crate::pipeline::session::Unrendered;
+use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::Diagnostic;
+
+/// A request for a benchmark.
+#[derive(Clone, Debug, Default)]
+pub struct BenchRequest {
+    /// The scenes.
+    pub scenes: Vec<PathBuf>,
+    /// Overrides of all images and references. Size, samples, seed, time and noise threshold are ignored.
+    pub common: Overrides,
+    /// Width in pixels. The default follows from the height and the scene's aspect ratio.
+    pub width: Option<u32>,
+    /// Height in pixels. The default follows from the width and the scene's aspect ratio.
+    pub height: Option<u32>,
+    /// Settings that define the methods.
+    pub toggles: Toggles,
+    /// Samples or times to measure at.
+    pub steps: StepSchedule,
+    /// Images per step.
+    pub seeds: u32,
+    /// The first seed.
+    pub seed: u32,
+    /// Where the references come from.
+    pub reference: ReferenceSource,
+    /// Time limit in seconds, where samples and times are not given.
+    pub within: f64,
+    /// Folder for cached references. `None` disables the cache.
+    pub cache: Option<PathBuf>,
+    /// Output files, which no scene may depend on.
+    pub targets: Vec<PathBuf>,
+}
+
+/// Samples or times of a method's steps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum StepSchedule {
+    /// 1, 4, 16, … samples while time remains, up to 1 % of the references' samples.
+    #[default]
+    Climb,
+    /// These samples per pixel.
+    Samples(Vec<u32>),
+    /// These render times in seconds.
+    Seconds(Vec<f64>),
+}
+
+/// Source of the references.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum ReferenceSource {
+    /// Rendered with path in the available time, with at most a hundred times the largest requested samples.
+    #[default]
+    InTime,
+    /// Rendered with path and this many samples.
+    Samples(u32),
+    /// Two image files, which may be the same.
+    Files([PathBuf; 2]),
+}
+
+/// Events of a benchmark.
+#[derive(Clone, Debug)]
+pub enum BenchEvent {
+    /// A task begins.
+    Begins {
+        /// Name of the task.
+        what: String,
+        /// Estimated seconds until the end.
+        left: Option<f64>,
+    },
+    /// A task is done. A line for logs.
+    Done(String),
+    /// A step is done. A point of the plot.
+    Point {
+        /// The scene's path as given by the caller.
+        scene: String,
+        /// The method's name in tables.
+        method: String,
+        /// Median of the seconds of photon mapping and rendering.
+        seconds: f64,
+        /// Median of relMSE.
+        relmse: f64,
+    },
+    /// Warnings about a scene.
+    Warnings(Vec<Diagnostic>),
+}
+
+/// A benchmark that ended early, with the results so far.
+#[derive(Clone, Debug)]
+pub struct Unfinished {
+    /// The reason.
+    pub error: BenchError,
+    /// Results of the completed scenes.
+    pub done: Results,
+}
+
+/// Reasons for ending early.
+#[derive(Clone, Debug)]
+pub enum BenchError {
+    /// A scene is invalid, or the work failed.
+    Failed(Failure),
+    /// The arguments are invalid. A message with a hint.
+    Call(String),
+    /// The benchmark was cancelled.
+    Cancelled,
+}
+
+impl From<Unrendered> for BenchError {
+    fn from(why: Unrendered) -> Self {
+        match why {
+            Unrendered::Failed(failure) => Self::Failed(failure),
+            Unrendered::Cancelled => Self::Cancelled,
+        }
+    }
+}
