@@ -81,6 +81,11 @@ impl SceneText {
         self.sets.iter().map(|set| set.span.start)
     }
 
+    /// Whether a span is in a `--set` value instead of the file.
+    pub(super) fn is_set(&self, span: &Range<usize>) -> bool {
+        span.start >= self.file
+    }
+
     /// Marks the text as generated for a model.
     pub(super) fn generated(self) -> Self {
         Self { is_generated: true, ..self }

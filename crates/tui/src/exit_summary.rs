@@ -25,7 +25,7 @@ pub(super) fn not_kept(state: &State) -> Option<String> {
         state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
     let camera = if is_in_scene { CameraChange::default() } else { shown.camera };
     let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
-    let options = Toggles { camera, ..shown }.options(has_orbiter);
+    let options = Toggles { camera, ..shown }.options(state.request.camera.filter(|_| has_orbiter));
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
@@ -157,6 +157,7 @@ mod tests {
     use crate::fixtures::{TestUi, diagnostic, done, progress};
     use crate::messages;
     use crate::pipeline::protocol::{Event, Stage, Status};
+    use crate::scene::description::Camera;
     use crate::scene::diagnostic::Severity;
 
     /// A modified report of a finished request.
@@ -364,6 +365,23 @@ mod tests {
         assert!(words.contains("--set 'camera.position=["), "{words}");
         ui.press('0');
         assert_eq!(not_kept(&ui.state), None);
+    }
+
+    #[test]
+    fn options_replace_an_orbiter_camera() {
+        let text = "[camera]\norbiter = 'a.txt'\naperture = 0.1\n";
+        let mut ui = TestUi::new();
+        ui.finish([200, 30, 30]);
+        ui.state.request.text = Some(text.into());
+        ui.press('l');
+        let moved = ui.state.request.viewpoint().expect("a camera");
+        let words = not_kept(&ui.state).expect("moved");
+        let sets = words.split("--set ").skip(1).map(|set| set.trim().replace('\'', ""));
+        let sets: Vec<String> = sets.collect();
+        let camera = crate::scene::Loaded::camera_of(text, &sets);
+        let Some(Camera::LookAt { position, look_at, fov, focus, .. }) = camera else { panic!("{words}") };
+        assert_eq!((position, look_at), (moved.pose.position, moved.pose.look_at));
+        assert_eq!((fov, focus), (moved.fov, moved.focus));
     }
 
     #[test]

@@ -24,9 +24,16 @@ pub(super) fn read(root: &TableReader<'_>) -> Option<Camera> {
         return None;
     }
     let table = root.table("camera")?;
-    let camera = if table.optional("orbiter").is_given() { orbiter(&table) } else { look_at(&table) };
+    let camera = if has_orbiter(&table) { orbiter(&table) } else { look_at(&table) };
     table.finish();
     camera
+}
+
+/// Whether the orbiter file defines the camera: `--set` of both `position` and `look_at` replaces it.
+fn has_orbiter(table: &TableReader<'_>) -> bool {
+    let is_set = |name| table.optional(name).span().is_some_and(|span| table.context.is_set(&span));
+    let is_replaced = is_set("position") && is_set("look_at") && !is_set("orbiter");
+    table.optional("orbiter").is_given() && !is_replaced
 }
 
 fn aperture(table: &TableReader<'_>) -> f64 {

@@ -98,6 +98,11 @@ impl<'a> Context<'a> {
         Self { source, path, lines, issues, counts, searches }
     }
 
+    /// Whether a span is in a `--set` value instead of the file.
+    pub(super) fn is_set(&self, span: &Range<usize>) -> bool {
+        self.source.is_set(span)
+    }
+
     /// Adds an issue to the list.
     pub(super) fn report(&self, issue: Issue) {
         self.report_with(|| issue);

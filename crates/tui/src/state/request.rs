@@ -26,8 +26,8 @@ pub(crate) struct Toggles {
 }
 
 impl Toggles {
-    /// The same settings as command-line options. A camera from an orbiter file has no option.
-    pub(crate) fn options(&self, has_orbiter: bool) -> Vec<String> {
+    /// The same settings as command-line options. A position replaces the scene's orbiter camera, `orbiter`, entirely.
+    pub(crate) fn options(&self, orbiter: Option<Viewpoint>) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" };
         let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
         let CameraChange { pose, fov, focus } = self.camera;
@@ -42,14 +42,15 @@ impl Toggles {
         .into_iter()
         .flatten()
         .collect();
-        if has_orbiter && pose.is_some() {
-            options.push("the camera's position".to_owned());
-        } else if let Some(Pose { position, look_at, up }) = pose {
+        if let Some(Pose { position, look_at, up }) = pose {
             options.extend(
                 [("position", position), ("look_at", look_at), ("up", up)]
                     .map(|(key, value)| vector(key, value)),
             );
         }
+        let orbiter = orbiter.filter(|_| pose.is_some());
+        let fov = fov.or(orbiter.map(|camera| camera.fov));
+        let focus = focus.or(orbiter.filter(|camera| camera.aperture > 0.0).map(|camera| camera.focus));
         options.extend(fov.map(|it| format!("--set camera.fov={it}")));
         options.extend(focus.map(|it| format!("--set camera.focus={it}")));
         options
