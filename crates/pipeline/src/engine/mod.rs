@@ -21,6 +21,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub(super) use self::orders::{Interruption, Meanwhile, Orders};
 use self::outcome::Outcome;
 pub use self::outcome::{Rendered, Unrendered};
+use self::outputs::drop_report;
 use self::own::{OwnImage, lookups, own_plan};
 use self::unfinished::Good;
 use super::assembly::{Eye, Keyed, world};
@@ -567,8 +568,8 @@ impl Engine {
         let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
-            } else if orders.take_write() {
-                write_by_hand(canvas, to, &mut written.borrow_mut());
+            } else if orders.take_write() && write_by_hand(canvas, to, &mut written.borrow_mut()) {
+                drop_report(to);
             }
             if let Some(at_hand) = &self.at_hand {
                 meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);

@@ -3,7 +3,7 @@
 use super::super::plan::Plan;
 use super::super::protocol::{ImageReport, Report, Request, Writing};
 use super::super::render::film_state::FilmState;
-use super::super::report::finish::write_report;
+use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::Sink;
 use super::super::stages::write::{Destination, write_by_hand, write_if_wanted, write_moving};
 use super::super::stages::{Findings, Staged, Stop};
@@ -11,6 +11,13 @@ use super::super::targets::conflicts;
 use super::Engine;
 use crate::control::CancelToken;
 use crate::output::OutputError;
+
+/// Removes a report that is of another image than the files of a plan.
+pub(super) fn drop_report(to: Destination<'_>) {
+    if let Err(error) = remove_report(to.plan, to.inputs, to.sink) {
+        to.sink.write_failed(None, format!("the report is of an earlier image: {error}"));
+    }
+}
 
 impl Engine {
     /// Whether there is a picture without holes.
@@ -84,9 +91,19 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the report of an image that a key has written, if its render is finished.
+    /// Writes the report of an image that a key has written. If its render is not finished, there is none.
     fn report_by_hand(&self, sink: &Sink) {
-        let (Some(report), Some(plan)) = (&self.report, &self.plan) else { return };
+        let Some(plan) = &self.plan else { return };
+        let Some(report) = &self.report else {
+            return drop_report(Destination {
+                plan,
+                layers: &[],
+                inputs: &self.inputs,
+                contents: &self.contents,
+                is_own: self.is_own,
+                sink,
+            });
+        };
         let paths: Vec<String> =
             plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };

@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::Inputs;
 use crate::integrators::{RayCounters, receivers};
-use crate::output::write::atomic_until;
+use crate::output::write::{Guard, atomic_until};
 use crate::output::{OutputError, json};
 use crate::plan::Plan;
 use crate::protocol::StageReport;
@@ -63,6 +63,21 @@ pub(crate) fn write_report(
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
     guarded(plan, inputs, path, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
+}
+
+/// Removes the report of an earlier image, where an unfinished image took its place. Leaves files that a report must not replace.
+///
+/// # Errors
+/// Why not, with the file's name.
+pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result<(), OutputError> {
+    let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
+    let failed = |source| OutputError::File { path: path.clone(), source };
+    let remove = |guard: &Guard<'_>| {
+        let real = std::fs::canonicalize(path).map_err(failed)?;
+        (guard.may_replace)(&real)?;
+        std::fs::remove_file(&real).map_err(failed)
+    };
+    guarded(plan, inputs, path, sink, remove)
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {

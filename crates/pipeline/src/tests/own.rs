@@ -224,6 +224,34 @@ fn the_checkpoint_of_the_own_render_is_kept_when_keys_show_something_else_at_the
     assert!(!keys.0.path("out.ppm.checkpoint").exists());
 }
 
+#[test]
+fn an_unfinished_image_leaves_no_older_report() {
+    let mut keys = Keys::with(slow);
+    let report = keys.0.path("r.json");
+    keys.0.overrides.report = Some(report.clone());
+    keys.0.done();
+    assert!(report.exists());
+    keys.0.edit("samples = 4", "samples = 200");
+    let begins = |of: u64, keys: &Keys| {
+        let is_begun = |event: &Event| matches!(event, Event::Progress { generation, progress } if *generation == of && progress.samples >= 2);
+        while !is_begun(&keys.0.next()) {}
+    };
+    let of = keys.show(|overrides| overrides.dof = Some(false));
+    begins(of, &keys);
+    keys.0.worker.send(Command::Write);
+    while !matches!(keys.0.next(), Event::Written { is_own: false, .. }) {}
+    // The next request begins after the file and its report.
+    let events = keys.shown(|overrides| overrides.exposure = Some(1.0));
+    assert!(!report.exists(), "{events:?}");
+    // A file that is no report of glimt stays.
+    fs::write(&report, "{}").expect("written");
+    let of = keys.show(|overrides| overrides.dof = Some(false));
+    begins(of, &keys);
+    keys.0.worker.send(Command::Write);
+    keys.shown(|overrides| overrides.exposure = Some(2.0));
+    assert_eq!(fs::read_to_string(&report).expect("kept"), "{}");
+}
+
 /// Bytes that a render of the scene needs with these overrides.
 fn needed(keys: &Keys, overrides: &Overrides) -> u64 {
     crate::check::memory_needed(&keys.0.path("scene.toml"), overrides).expect("a scene")
