@@ -343,14 +343,24 @@ fn unknown_word_is_taken_for_a_command() {
 
 /// In a mode that does not wait for the file to become a scene.
 #[test]
-fn images_parts_and_checkpoints_are_not_scenes() {
+fn images_are_rejected_with_their_info() {
     let dir = TestDir::new();
     dir.write("ball.toml", SCENE);
     dir.expect("ball.toml --once -o a.png -o b.exr -o c.hdr -o d.jpg -o e.webp -o f.ppm", 0);
     dir.expect("ball.toml --once -o h.part --shard 1/2", 0);
     fs::rename(dir.path("a.png"), dir.path("a.toml")).expect("renamed");
     dir.write("g.gif", "GIF89a");
+    dir.write("i.bmp", b"BM\x46\0\0\0\0\0\0\0\x36");
+    dir.write("j.tif", b"II*\0");
+    let mut tga = [0; 18];
+    (tga[2], tga[12], tga[14], tga[16]) = (2, 4, 4, 24);
+    dir.write("k.tga", tga);
+    dir.write("l.pgm", "P2\n1 1\n255\n7\n");
     for (file, content) in [
+        ("i.bmp", "(BMP)"),
+        ("j.tif", "(TIFF)"),
+        ("k.tga", "(TGA)"),
+        ("l.pgm", "(PPM)"),
         ("a.toml", "(PNG)"),
         ("b.exr", "(EXR)"),
         ("c.hdr", "(HDR)"),
@@ -363,12 +373,20 @@ fn images_parts_and_checkpoints_are_not_scenes() {
         for call in [file.to_owned(), format!("{file} --once"), format!("check {file}")] {
             let stderr = dir.expect(&call, 2);
             assert_mentions(&stderr, &[content]);
-            let info = if file == "h.part" { "1 of 2" } else { "ball.toml" };
-            assert!(mentions(&stderr, info) || file == "g.gif", "{call}: {stderr}");
+            // The output of `info` follows the error.
+            let info = dir.glimt(&format!("info {file}")).output().expect("it runs");
+            let info = [info.stdout, info.stderr].concat();
+            let info = String::from_utf8_lossy(&info).replace("error: ", "");
+            assert!(!info.is_empty() && stderr.ends_with(&info), "{call}: {stderr}\n{info}");
         }
+        let lines = dir.expect(&format!("{file} --once --progress json"), 2);
+        let lines: Vec<_> = lines.lines().collect();
+        let [line] = lines.as_slice() else { panic!("{lines:?}") };
+        let line: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!((&line["event"], &line["kind"]), (&"failed".into(), &"scene".into()));
+        assert_eq!(line["diagnostics"].as_array().map(Vec::len), Some(1));
+        assert_eq!(line["image"]["path"].as_str(), Some(file).filter(|file| *file != "g.gif"), "{line}");
     }
-    let json = dir.expect("a.toml --once --progress json", 2);
-    assert!(json.lines().all(|line| line.starts_with('{')) && mentions(&json, "(PNG)"), "{json}");
 }
 
 /// Checks the suggestion in the message: the stacks of so many threads exceed the limit.

@@ -82,9 +82,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
 }
 
 fn render(order: lower::Order, console: &Console) -> Exit {
-    // With JSON progress, the error is reported as JSON.
-    let refused = (!order.is_in_json()).then(|| commands::info::instead_of_scene(&order.scene, console));
-    match refused.flatten() {
+    match commands::info::instead_of_scene(&order.scene, order.is_in_json(), console) {
         Some(exit) => exit,
         None if order.is_once => once::run(&order, console),
         None => live::run(order, console),

@@ -5,7 +5,7 @@ mod json;
 mod plain;
 
 pub(super) use self::bars::style;
-pub(super) use self::json::line as json_line;
+pub(super) use self::json::{failed, line as json_line};
 use crate::args::Progress;
 use crate::console::Console;
 use crate::pipeline::protocol::{Event, RenderProgress};

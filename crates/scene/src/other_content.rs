@@ -24,15 +24,17 @@ pub(super) enum OtherContent {
     Part,
 }
 
-/// Returns an error if a file is an image, a part or a checkpoint, whatever its name. `None` for other or unreadable files.
-pub fn other_content(path: &Path) -> Option<Box<Diagnostic>> {
+/// If a file is an image, a part or a checkpoint, whatever its name, returns its format and an error about it. `None` for other or
+/// unreadable files.
+pub fn other_content(path: &Path) -> Option<(&'static str, Box<Diagnostic>)> {
     const START: u64 = 1 << 10;
     let (opened, _) = file::open(path).ok()?.ok()?;
     let mut bytes = Vec::new();
     opened.take(START).read_to_end(&mut bytes).ok()?;
     match OtherContent::of(&bytes)? {
         OtherContent::Model { .. } => None,
-        content @ (OtherContent::Image(_) | OtherContent::Part) => Some(content.problem(path)),
+        content @ OtherContent::Image(format) => Some((format, content.problem(path))),
+        content @ OtherContent::Part => Some(("part", content.problem(path))),
     }
 }
 
@@ -56,9 +58,7 @@ impl OtherContent {
                 format!("glimt detects models by their extension: rename it to {}.{ending}", visible(&name)),
             ),
             Self::Image(format) => {
-                let has_settings = !matches!(format, "BMP" | "TGA" | "TIFF");
-                let info = if has_settings { "`glimt info` shows how an image was rendered; " } else { "" };
-                let help = format!("{info}{NEW_SCENE_HELP}");
+                let help = format!("`glimt info` shows how an image was rendered; {NEW_SCENE_HELP}");
                 (format!("this is an image ({format}), not a scene"), help)
             }
             Self::Part => (
@@ -179,7 +179,7 @@ mod tests {
         std::fs::write(&path, PART_MARK).expect("written");
         let part = super::super::text_now(&path).expect_err("an error");
         assert_eq!(part, OtherContent::Part.problem(&path));
-        assert_eq!(other_content(&path), Some(part));
+        assert_eq!(other_content(&path), Some(("part", part)));
         std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
         let file = std::fs::File::options().write(true).open(&path).expect("opened");
         file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");

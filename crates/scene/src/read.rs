@@ -39,7 +39,8 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     }
     let bytes = bytes(path).map_err(|(message, help)| {
         // Report a large image as an image, not as a large scene.
-        other_content(path).unwrap_or_else(|| Diagnostic::error(path, message, help, None))
+        other_content(path)
+            .map_or_else(|| Diagnostic::error(path, message, help, None), |(_, problem)| problem)
     })?;
     if file::is_lfs_pointer(&bytes) {
         return Err(Diagnostic::error(path, LFS_POINTER.to_owned(), Some(LFS_HELP.to_owned()), None));

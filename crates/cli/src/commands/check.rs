@@ -17,7 +17,7 @@ pub(crate) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Consol
     if is_json {
         return in_json(scene, sets, console);
     }
-    if let Some(exit) = instead_of_scene(scene, console) {
+    if let Some(exit) = instead_of_scene(scene, false, console) {
         return exit;
     }
     match check(scene, sets) {

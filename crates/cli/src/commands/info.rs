@@ -8,12 +8,14 @@ use crate::args::InfoArgs;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::json::file;
-use crate::output::settings::{Made, made};
+use crate::output::settings::{Made, MadeError, made};
+use crate::pipeline::protocol::Failure;
+use crate::progress::{failed, json_line};
 use crate::scene::other_content;
 use crate::scene::sanitize::visible;
 
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
-    let made = match made(&args.image) {
+    let made = match describe(&args.image) {
         Ok(made) => made,
         Err(error) => return console.fail(Exit::WRONG, &error.to_string()),
     };
@@ -28,12 +30,31 @@ pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
     if made.is_own() { Exit::DONE } else { Exit::FAILED }
 }
 
-/// If the file is an image, part or checkpoint instead of a scene, reports that and how it was rendered. `None` for other files.
-pub(crate) fn instead_of_scene(path: &Path, console: &Console) -> Option<Exit> {
-    let problem = other_content(path)?;
-    console.diagnostics(&[*problem]);
-    if let Ok(made) = made(path) {
-        console.say_lines(&as_text(path, &made));
+/// Describes how a file was made. For an image in a format without settings, only the format is known.
+///
+/// # Errors
+/// Those of [`made`].
+fn describe(path: &Path) -> Result<Made, MadeError> {
+    made(path).or_else(|error| match (&error, other_content(path)) {
+        (MadeError::NoPicture { .. }, Some((format, _))) => {
+            Ok(Made { format: format.to_owned(), ..Made::default() })
+        }
+        _ => Err(error),
+    })
+}
+
+/// If the file is an image, part or checkpoint instead of a scene, reports that and how it was rendered, as one JSON line or as text.
+/// `None` for other files.
+pub(crate) fn instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
+    let (_, problem) = other_content(path)?;
+    let made = describe(path);
+    if is_json {
+        let mut value = failed(&Failure::Scene(vec![*problem]));
+        value["image"] = made.map_or(Value::Null, |made| as_json(path, &made));
+        json_line(&value);
+    } else {
+        console.diagnostics(&[*problem]);
+        console.say_lines(&made.map_or_else(|error| format!("{error}\n"), |made| as_text(path, &made)));
     }
     Some(Exit::WRONG)
 }

@@ -126,7 +126,7 @@ fn checkpoint(news: &CheckpointNews) -> Value {
     json!({ "event": "checkpoint", "status": status, "path": path, "message": message, "samples": samples })
 }
 
-fn failed(failure: &Failure) -> Value {
+pub(crate) fn failed(failure: &Failure) -> Value {
     match failure {
         Failure::Work(message) => {
             json!({ "event": "failed", "kind": "work", "message": message, "diagnostics": [] })

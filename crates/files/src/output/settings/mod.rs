@@ -76,13 +76,22 @@ pub enum MadeError {
         /// The reason.
         why: String,
     },
-    /// The file is no picture that carries settings.
+    /// The header of the picture cannot be read.
     #[error("{}: {why}", path.display())]
-    NoPicture {
+    Damaged {
         /// The file.
         path: PathBuf,
         /// The reason.
         why: String,
+    },
+    /// The file is no picture that carries settings.
+    #[error(
+        "{}: it is no picture that carries settings: png, apng, gif, exr, hdr, jpg, ppm, webp, nor a part or a checkpoint",
+        path.display()
+    )]
+    NoPicture {
+        /// The file.
+        path: PathBuf,
     },
 }
 
@@ -115,7 +124,10 @@ pub fn made(path: &Path) -> Result<Made, MadeError> {
             return Ok(made);
         }
     }
-    of_bytes(&start).map_err(|why| MadeError::NoPicture { path: path.to_owned(), why })
+    of_bytes(&start).map_err(|why| match why {
+        Some(why) => MadeError::Damaged { path: path.to_owned(), why },
+        None => MadeError::NoPicture { path: path.to_owned() },
+    })
 }
 
 fn start(file: &File) -> std::io::Result<Vec<u8>> {
@@ -125,8 +137,11 @@ fn start(file: &File) -> std::io::Result<Vec<u8>> {
 }
 
 /// The same by the first bytes of a picture.
-fn of_bytes(bytes: &[u8]) -> Result<Made, String> {
-    let wrong = |format: &str| format!("its {format} header is damaged or cut short");
+///
+/// # Errors
+/// What is wrong with its header. `None` if no picture that carries settings begins so.
+fn of_bytes(bytes: &[u8]) -> Result<Made, Option<String>> {
+    let wrong = |format: &str| Some(format!("its {format} header is damaged or cut short"));
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => of_png(bytes).ok_or_else(|| wrong("PNG")),
         [0x76, 0x2f, 0x31, 0x01, ..] => of_exr(bytes).ok_or_else(|| wrong("EXR")),
@@ -135,7 +150,7 @@ fn of_bytes(bytes: &[u8]) -> Result<Made, String> {
         [0xff, 0xd8, ..] => text::of_jpeg(bytes).ok_or_else(|| wrong("JPEG")),
         [b'R', b'I', b'F', b'F', ..] => webp::of_webp(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
         [b'G', b'I', b'F', ..] => gif::of_gif(bytes).ok_or_else(|| wrong("GIF")),
-        _ => Err("it is no picture that carries settings: png, apng, gif, exr, hdr, jpg, ppm, webp, nor a part or a checkpoint".to_owned()),
+        _ => Err(None),
     }
 }
 
