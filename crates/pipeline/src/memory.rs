@@ -121,7 +121,9 @@ impl Foretold {
         let items = largest.iter().filter(|(_, bytes)| *bytes * 100 > all);
         let items: Vec<String> = items.map(|(name, bytes)| format!("{name} {}", words(*bytes))).collect();
         let way_out = match largest.first() {
-            _ if all - self.own_film() <= most => "go back to the scene's own settings, or let its image be finished first",
+            _ if all - self.own_film() <= most => {
+                "go back to the scene's own settings, or let its image be finished first"
+            }
             Some(("the film" | "the picture", _)) => "render a smaller picture, or parts of it by --crop",
             Some(("the layers", _)) => "ask for fewer layers or a smaller picture",
             Some((FRAMES, _)) => "render fewer or smaller frames, or a file each, as in a_####.png",

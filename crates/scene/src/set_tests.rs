@@ -103,11 +103,13 @@ fn unclosed_brackets_in_the_file_spare_set() {
 fn a_set_position_replaces_the_orbiter_file() {
     let camera = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-        let source = Source::with_sets("[camera]\norbiter = 'a.txt'\nfocus = 2.0\n".into(), &sets).expect("sets");
+        let source =
+            Source::with_sets("[camera]\norbiter = 'a.txt'\nfocus = 2.0\n".into(), &sets).expect("sets");
         document::camera_of(&source)
     };
     let place = ["camera.position=[1,2,3]", "camera.look_at=[0,0,0]"];
-    let Some(Camera::LookAt { position, fov, focus, .. }) = camera(&[place[0], place[1], "camera.fov=30"]) else {
+    let Some(Camera::LookAt { position, fov, focus, .. }) = camera(&[place[0], place[1], "camera.fov=30"])
+    else {
         panic!("the call says where the camera is")
     };
     assert_eq!((position, fov, focus), (crate::math::DVec3::new(1.0, 2.0, 3.0), 30.0, 2.0));

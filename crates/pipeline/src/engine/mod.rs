@@ -569,7 +569,7 @@ impl Engine {
             if !is_covered {
                 meanwhile.postpone_write(sink);
             } else if orders.take_write() && write_by_hand(canvas, to, &mut written.borrow_mut()) {
-                drop_report(to);
+                drop_report(plan, to.inputs, sink);
             }
             if let Some(at_hand) = &self.at_hand {
                 meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);

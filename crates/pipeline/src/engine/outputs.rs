@@ -1,5 +1,6 @@
 //! Files that the engine writes, and those that it must not.
 
+use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{ImageReport, Report, Request, Writing};
 use super::super::render::film_state::FilmState;
@@ -13,9 +14,9 @@ use crate::control::CancelToken;
 use crate::output::OutputError;
 
 /// Removes a report that is of another image than the files of a plan.
-pub(super) fn drop_report(to: Destination<'_>) {
-    if let Err(error) = remove_report(to.plan, to.inputs, to.sink) {
-        to.sink.write_failed(None, format!("the report is of an earlier image: {error}"));
+pub(super) fn drop_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
+    if let Err(error) = remove_report(plan, inputs, sink) {
+        sink.write_failed(None, format!("the report is of an earlier image: {error}"));
     }
 }
 
@@ -94,16 +95,7 @@ impl Engine {
     /// Writes the report of an image that a key has written. If its render is not finished, there is none.
     fn report_by_hand(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
-        let Some(report) = &self.report else {
-            return drop_report(Destination {
-                plan,
-                layers: &[],
-                inputs: &self.inputs,
-                contents: &self.contents,
-                is_own: self.is_own,
-                sink,
-            });
-        };
+        let Some(report) = &self.report else { return drop_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
             plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::outputs::drop_report;
 use super::own::{lookups, own_plan};
 use super::{Engine, Meanwhile};
 use crate::memory::Foretold;
@@ -78,6 +79,10 @@ impl Engine {
             // The stage reports files that cannot be written.
             let written = self.write(&request, &ready.plan, &Findings::default(), sink, meanwhile.writing);
             is_written_now = written.is_ok_and(|staged| staged.status == Status::Done);
+            if is_written_now {
+                // A report has stages that read the scene as it is.
+                drop_report(&ready.plan, &self.inputs, sink);
+            }
         }
         Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }

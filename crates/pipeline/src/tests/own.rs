@@ -252,6 +252,25 @@ fn an_unfinished_image_leaves_no_older_report() {
     assert_eq!(fs::read_to_string(&report).expect("kept"), "{}");
 }
 
+#[test]
+fn the_last_good_image_leaves_no_older_report() {
+    let mut bench = Bench::with(SCENE, slow);
+    bench.writing = Writing::Try;
+    let report = bench.path("r.json");
+    bench.overrides.report = Some(report.clone());
+    bench.done();
+    let earlier = bench.picture();
+    bench.edit("samples = 4", "samples = 8");
+    bench.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
+    let of = bench.send();
+    // Its files are read; then the scene breaks.
+    while !matches!(bench.next(), Event::Progress { generation, .. } if generation == of) {}
+    bench.edit("[camera]", "[camera");
+    bench.send();
+    while !matches!(bench.next(), Event::LastGoodEnded { .. }) {}
+    assert!(bench.picture() != earlier && !report.exists());
+}
+
 /// Bytes that a render of the scene needs with these overrides.
 fn needed(keys: &Keys, overrides: &Overrides) -> u64 {
     crate::check::memory_needed(&keys.0.path("scene.toml"), overrides).expect("a scene")
@@ -268,7 +287,8 @@ fn memory_counts_the_unfinished_own_film() {
         // The same film in another way takes no more memory.
         let stops = |keys: &mut Keys, change: fn(&mut Overrides)| {
             let of = keys.show(change);
-            let begins = |event: &Event| matches!(event, Event::Progress { generation, .. } if *generation == of);
+            let begins =
+                |event: &Event| matches!(event, Event::Progress { generation, .. } if *generation == of);
             loop {
                 match keys.0.next() {
                     Event::Failed { generation, failure } if generation == of => return Some(failure),
