@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use glimt::film::Picture;
 use glimt::math::Vec3;
 use glimt::math::color::srgb8_to_linear;
-use glimt::tui::{ColorDepth, PreviewChoice, filled_squares, xterm_rgb, shown};
+use glimt::tui::{ColorDepth, PreviewChoice, filled_squares, shown, xterm_rgb};
 use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;

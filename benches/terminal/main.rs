@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Picture;
 use glimt::pipeline::protocol::PreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{PacingAdvice, Fidelity, FrameTiming, Painter, advise};
+use glimt::tui::paint::{Fidelity, FrameTiming, PacingAdvice, Painter, advise};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -167,7 +167,7 @@ impl Window {
                 aimed_samples: Some(aimed),
                 since_aim: Duration::from_secs_f64(shot.seconds - at),
                 is_shown: true,
-                is_quick: false,
+                is_fast: false,
                 is_in_pixels: false,
                 is_final: shot.is_final,
                 final_in: None,

@@ -137,7 +137,10 @@ fn merged_images_name_the_scene_as_renders_do() {
         dir.expect(&format!("{call} -o a/1.part --shard 1/2"), 0);
         dir.expect(&format!("{call} -o b/2.part --shard 2/2"), 0);
         dir.expect(&format!("merge out/two.{ending} a/1.part b/2.part --progress none"), 0);
-        assert!(dir.bytes(&format!("out/one.{ending}")) == dir.bytes(&format!("out/two.{ending}")), "{ending}");
+        assert!(
+            dir.bytes(&format!("out/one.{ending}")) == dir.bytes(&format!("out/two.{ending}")),
+            "{ending}"
+        );
     }
 }
 

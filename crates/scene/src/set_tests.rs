@@ -104,7 +104,7 @@ fn a_set_position_replaces_the_orbiter_file() {
     let camera = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
         let source =
-            Source::with_sets("[camera]\norbiter = 'a.txt'\nfocus = 2.0\n".into(), &sets).expect("sets");
+            SceneText::with_sets("[camera]\norbiter = 'a.txt'\nfocus = 2.0\n".into(), &sets).expect("sets");
         document::camera_of(&source)
     };
     let place = ["camera.position=[1,2,3]", "camera.look_at=[0,0,0]"];

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use glimt::scene::description::Scene;
 use glimt::scene::diagnostic::Diagnostic;
-use glimt::scene::keys::key::{Default, Form, KeyInfo, ValueKind, TableInfo, TypeInfo};
+use glimt::scene::keys::key::{Default, Form, KeyInfo, TableInfo, TypeInfo, ValueKind};
 use glimt::scene::keys::{self, limits::Limits};
 use glimt::scene::parse;
 

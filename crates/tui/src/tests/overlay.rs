@@ -7,6 +7,7 @@ use crate::choice::Choice;
 use crate::event::{Event, KeyPress};
 use crate::fixtures::*;
 use crate::keymap::{KEYMAP, OVERLAY};
+use crate::messages;
 use crate::pipeline::protocol::{self, Failure};
 use crate::pipeline::settings::{Effective, View};
 use crate::scene::diagnostic::{Diagnostic, Severity, SourceSpan};

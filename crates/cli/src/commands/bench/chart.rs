@@ -121,7 +121,8 @@ pub(super) fn show(results: &Results, console: &Console) {
         crossterm::terminal::size().map_or(80, |(columns, _)| columns.clamp(MIN_SIZE.0, MAX_COLUMNS));
     for scene in &results.scenes {
         console.answer(&format!("{}: relMSE over seconds (log–log)", scene.scene));
-        console.text(&as_text_lines(&ConvergenceChart::of(scene).drawn((columns, ROWS)), console.is_colored()));
+        console
+            .text(&as_text_lines(&ConvergenceChart::of(scene).drawn((columns, ROWS)), console.is_colored()));
     }
 }
 
