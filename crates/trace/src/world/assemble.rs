@@ -37,6 +37,7 @@ impl World {
             glass_solids: solids,
             unlit_glass: Box::default(),
             lens_glass: Vec::new(),
+            enclosing_glass: Box::default(),
             camera_solids: Vec::new(),
             has_second_uvs: has_second_uvs(scene, inputs),
             colored: colored(scene),
@@ -45,6 +46,7 @@ impl World {
         Self {
             unlit_glass: world.find_unlit_glass(),
             lens_glass: world.find_lens_glass(),
+            enclosing_glass: world.find_enclosing_glass(),
             camera_solids: world.find_camera_solids(),
             see_through: SeeThrough::of(&world).map(Box::new),
             ..world

@@ -4,11 +4,20 @@
 //! error bound. It crosses all of them at once, from a point certainly before them to one certainly beyond. New rays start at one
 //! of these two points, so that no surface is missed and none is hit twice.
 
+use arrayvec::ArrayVec;
+
 use super::isolated::meets;
 use super::{Geometry, Hit, MeshInstance, Object, World};
+use crate::accel::Met;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
+
+/// Maximum number of solids around a ray that are recorded: the last in file order.
+pub const MAX_INTERIORS: usize = 4;
+
+/// The last closed glass shapes of a subtree, in descending order. Others that enclose a point with them have no effect there.
+pub(super) type EnclosingGlass = ArrayVec<u32, MAX_INTERIORS>;
 
 /// Two points on either side of coincident surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +109,7 @@ impl World {
             }
             self.geometry.hit_candidate(at, memory)
         } else {
-            self.geometry.find_candidates(at, memory)
+            self.geometry.find_candidates(at, memory, &self.enclosing_glass)
         };
         self.classify_candidates(at, (memory, error), visit)
     }
@@ -239,6 +248,15 @@ impl World {
         })
     }
 
+    /// The [`EnclosingGlass`] of each subtree. Empty if few objects are nested.
+    pub(super) fn find_enclosing_glass(&self) -> Box<[EnclosingGlass]> {
+        let is_glass = |id: u32| {
+            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
+            self.is_closed(id) && self.is_glass(material)
+        };
+        self.geometry.tree().last_of_subtrees(is_glass).into()
+    }
+
     /// Whether an object is a closed shape that contains a point.
     pub fn encloses(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
@@ -275,14 +293,26 @@ impl Geometry {
     }
 
     /// Collects shapes and triangles that may coincide with the hit point. Returns their error bound per axis.
-    pub(super) fn find_candidates(&self, at: &ContactQuery<'_>, memory: &mut ContactScratch) -> Vec3 {
+    /// Of the shapes that enclose it from afar, only the last in `enclosing` for each subtree.
+    pub(super) fn find_candidates(
+        &self,
+        at: &ContactQuery<'_>,
+        memory: &mut ContactScratch,
+        enclosing: &[EnclosingGlass],
+    ) -> Vec3 {
         let ContactScratch { objects, triangles } = memory;
         objects.clear();
         triangles.clear();
         let point = at.surface.point;
         let near = Aabb { min: point, max: point }.grown(self.margin(at));
         objects.extend(self.unbounded());
-        self.tree().meeting(&near, |id| objects.push(id));
+        self.tree().meeting_surfaces(&near, |met| {
+            match met {
+                Met::Primitive(id) => objects.push(id),
+                Met::Enclosing(subtree) => objects.extend(enclosing.get(subtree).into_iter().flatten()),
+            }
+            true
+        });
         let mut error = at.surface.error;
         for &id in &*objects {
             let Object::Mesh(mesh) = &self.objects()[id as usize] else { continue };

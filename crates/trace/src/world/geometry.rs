@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::accel::{Bvh, InstructionSet};
+use crate::accel::{Bvh, InstructionSet, Shell};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint, SurfaceRequest};
+use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::LightObject;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -100,11 +100,14 @@ impl Geometry {
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
-        let (tree, instructions) = (Bvh::build(&boxes, token)?, InstructionSet::best());
+        let shell = |id: u32| shell(&objects[id as usize], &boxes[id as usize]);
+        let (tree, instructions) = (Bvh::build(&boxes, token)?.with_shells(shell), InstructionSet::best());
         let merged = merged.map(|meshes| -> Result<_, Cancelled> {
             let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
-            Ok(MergedTree { over: Bvh::build(&with_all, token)?, meshes })
+            let of_merged = meshes.bounds();
+            let shell = |id: u32| objects.get(id as usize).map_or(Shell::around(&of_merged), |_| shell(id));
+            Ok(MergedTree { over: Bvh::build(&with_all, token)?.with_shells(shell), meshes })
         });
         let merged = merged.transpose()?;
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
@@ -347,6 +350,14 @@ impl Geometry {
             }
         }
         bytes
+    }
+}
+
+/// The shell of an object with this bounding box.
+fn shell(object: &Object, bounds: &Aabb) -> Shell {
+    match object {
+        Object::Shape(Shape::Sphere(sphere)) => Shell::sphere(sphere.center, sphere.radius),
+        Object::Shape(_) | Object::Mesh(_) => Shell::around(bounds),
     }
 }
 

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::{Geometry, Hit, MeshInstance, Object};
+use crate::accel::Met;
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
@@ -200,7 +201,13 @@ impl Geometry {
             return false;
         }
         let mut is_clear = true;
-        self.tree().meeting(around, |id| is_clear = is_clear && !is_near(id));
+        self.tree().meeting_surfaces(around, |met| {
+            is_clear = match met {
+                Met::Primitive(id) => !is_near(id),
+                Met::Enclosing(_) => false,
+            };
+            is_clear
+        });
         is_clear
     }
 }

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::contact::{CoincidentSurface, ContactQuery, ContactScratch, OffsetPoints};
-use super::super::{Geometry, Hit, Images, MeshTree, World, WorldInputs, lights};
+use super::super::{Geometry, Hit, Images, MAX_INTERIORS, MeshTree, World, WorldInputs, lights};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
@@ -266,7 +266,7 @@ fn isolated_regions_match_the_full_search() {
                 let error = if hit_candidate {
                     world.geometry.hit_candidate(&at, &mut memory)
                 } else {
-                    world.geometry.find_candidates(&at, &mut memory)
+                    world.geometry.find_candidates(&at, &mut memory, &world.enclosing_glass)
                 };
                 (world.classify_candidates(&at, (&memory, error), |one| near.push(one)), near)
             };
@@ -289,4 +289,44 @@ fn isolated_regions_match_the_full_search() {
     }
     assert!(touching > 5000, "{touching}");
     assert!(2 * isolated > asked, "{isolated} of {asked}");
+}
+
+#[test]
+fn nested_spheres_are_searched_in_logarithmic_time() {
+    for count in [100_u32, 400, 1600] {
+        // The order in the file is not that of the radii. Some spheres are matte.
+        let radius = |i: u32| 1.0 + f64::from(i * 37 % count) / f64::from(count);
+        let globe = |i: u32| Shape::Sphere { center: v(0.1, 0.2, 0.3), radius: radius(i) };
+        let material = |i: u32| [1, 2, 1, 2, 0][i as usize % 5];
+        let scene = (0..count).fold(SceneBuilder::new(), |scene, i| scene.shape(globe(i), material(i)));
+        let world = scene.world();
+        let mut random = SceneRandom(3);
+        let mut memory = ContactScratch::default();
+        for _ in 0..200 {
+            let from = (v(0.1, 0.2, 0.3) + random.place() * 1.5).as_vec3();
+            let ray = Ray::new(from, random.place().normalize().as_vec3());
+            let Some(hit) = world.geometry.closest(&ray) else { continue };
+            let surface = world.geometry.surface(&ray, &hit);
+            let facing = surface.normal.dot(ray.direction);
+            let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
+            let lead = hit.shape.t * f32::EPSILON * facing.abs();
+            let at = ContactQuery { hit: &hit, surface: &surface, normal, lead };
+            let mut around = Vec::new();
+            let mut found = 0;
+            let sides = world.contact(&at, &mut memory, |near| {
+                found += 1;
+                if let CoincidentSurface::Around { object, .. } = near {
+                    around.push(object);
+                }
+            });
+            assert!(found <= 4 * count.ilog2() as usize, "{found} of {count}");
+            // Those that determine the medium are among them.
+            let glasses = world.closed_glasses().map(|(object, _)| object);
+            let enclosing = glasses.filter(|object| world.encloses(*object, sides.beyond));
+            let enclosing: Vec<_> = enclosing.collect();
+            around.sort_unstable();
+            let last = |all: &[u32]| all[all.len().saturating_sub(MAX_INTERIORS)..].to_vec();
+            assert_eq!(last(&around), last(&enclosing), "{ray:?} {hit:?}");
+        }
+    }
 }

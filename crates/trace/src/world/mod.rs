@@ -34,7 +34,7 @@ use std::sync::Arc;
 pub use crate::accel::{PACKET_SIZE, RayInterval, SimdKernel, TreeNode};
 pub use camera::Camera;
 pub use camera_interior::CompoundSolid;
-pub use contact::{CoincidentSurface, ContactQuery, ContactScratch, OffsetPoints};
+pub use contact::{CoincidentSurface, ContactQuery, ContactScratch, MAX_INTERIORS, OffsetPoints};
 pub use coplanar::{Coplanar, coplanar_lights, light_lifts, with_lifted_lights};
 pub use emitters::{lights, photon_source, sky};
 pub use geometry::{Geometry, Hit};
@@ -120,6 +120,8 @@ pub struct World {
     unlit_glass: Box<[bool]>,
     /// Closed glass shapes that may contain points of the lens, with their materials.
     lens_glass: Vec<(u32, u32)>,
+    /// The glass shapes that count in each subtree of nested objects. Empty if few objects are nested.
+    enclosing_glass: Box<[contact::EnclosingGlass]>,
     /// Other glass solids that contain the camera, with their materials.
     camera_solids: Vec<(u32, u32)>,
     /// [`Material::is_mipmapped`] of each material.

@@ -16,6 +16,15 @@ const PARALLEL_SIZE: usize = 4096;
 /// Cost of a traversal step relative to a primitive test.
 const TRAVERSAL_COST: f32 = 1.0;
 
+/// Minimum number of nested primitives for which shells are worthwhile.
+const NESTED_SIZE: usize = 64;
+
+/// Minimum cost of the best plane, relative to no split, at which the boxes may be nested.
+const NESTED_COST: f32 = 0.9;
+
+/// Maximum cost of a split by size, relative to the best plane, for nested boxes.
+const SIZE_SPLIT_COST: f32 = 0.9;
+
 /// A box and its id during construction.
 #[derive(Clone, Copy)]
 pub(super) struct Reference {
@@ -36,6 +45,8 @@ struct BuiltSubtree {
     bounds: Aabb,
     /// Number of levels of nodes.
     depth: usize,
+    /// Whether many boxes are nested.
+    is_nested: bool,
 }
 
 impl Bvh {
@@ -52,7 +63,15 @@ impl Bvh {
             .collect();
         if references.is_empty() {
             let (nodes, order) = (Vec::new(), Vec::new());
-            return Ok(Self { nodes, order, bounds: Aabb::EMPTY, depth: 0, top: TopNode::EMPTY });
+            return Ok(Self {
+                nodes,
+                order,
+                bounds: Aabb::EMPTY,
+                depth: 0,
+                top: TopNode::EMPTY,
+                is_nested: false,
+                shells: None,
+            });
         }
         // A tree over n boxes has fewer than n nodes. Every subtree writes to its own slice.
         let mut nodes = vec![BinaryNode::EMPTY; (references.len() - 1).max(1)];
@@ -68,7 +87,8 @@ impl Bvh {
         }
         let order = references.iter().map(|reference| reference.id).collect();
         let top = TopNode::new((tree.bounds, tree.root), &nodes, &references);
-        Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1), top })
+        let BuiltSubtree { bounds, depth, is_nested, .. } = tree;
+        Ok(Self { nodes, order, bounds, depth: depth.max(1), top, is_nested, shells: None })
     }
 }
 
@@ -91,14 +111,15 @@ fn build_subtree(
     token: &CancelToken,
 ) -> Result<BuiltSubtree, Cancelled> {
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
-    let Some(middle) = partition(references, bounds, &start) else {
+    let Some((middle, by_size)) = partition(references, bounds, &start) else {
         let leaf = ChildRef { first: start.place as u32, count: references.len() as u32 };
-        return Ok(BuiltSubtree { root: leaf, bounds, depth: 0 });
+        return Ok(BuiltSubtree { root: leaf, bounds, depth: 0, is_nested: false });
     };
     let parallel = references.len() > PARALLEL_SIZE;
+    let is_nested = by_size && references.len() >= NESTED_SIZE;
     let (left, right) = references.split_at_mut(middle);
     let Some((node, rest)) = nodes.split_first_mut() else {
-        return Ok(BuiltSubtree { root: ChildRef::NONE, bounds, depth: 0 });
+        return Ok(BuiltSubtree { root: ChildRef::NONE, bounds, depth: 0, is_nested: false });
     };
     let (left_nodes, right_nodes) = rest.split_at_mut(left.len() - 1);
     let depth = start.depth + 1;
@@ -118,33 +139,64 @@ fn build_subtree(
     let (left, right) = (left?, right?);
     *node = BinaryNode { bounds: [left.bounds, right.bounds], child: [left.root, right.root] };
     let root = ChildRef { first: start.node as u32, count: 0 };
-    Ok(BuiltSubtree { root, bounds, depth: 1 + left.depth.max(right.depth) })
+    let is_nested = is_nested || left.is_nested || right.is_nested;
+    Ok(BuiltSubtree { root, bounds, depth: 1 + left.depth.max(right.depth), is_nested })
 }
 
-/// Partitions the references into two halves, or returns `None` if a leaf is cheaper.
-fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition) -> Option<usize> {
+/// Partitions the references into two halves. Returns the size of the first one and whether it has the smaller boxes, or `None`
+/// if a leaf is cheaper.
+fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition) -> Option<(usize, bool)> {
     let count = references.len();
     if count == 1 {
         return None;
     }
     let centroids = Aabb::around(references.iter().map(Reference::centroid));
     let split = (start.depth < SURFACE_AREA_LEVELS).then(|| best_split(references, centroids)).flatten();
+    let is_above_median = start.depth < SURFACE_AREA_LEVELS;
     match split {
+        None if count > LEAF_SIZE && is_above_median && centroids.extent() == Vec3::ZERO => {
+            Some((smaller_half(references), true))
+        }
+        Some(split) if count >= NESTED_SIZE && is_nested(references, bounds, &split) => {
+            Some((smaller_half(references), true))
+        }
         Some(split)
             if count > LEAF_SIZE || split.cost / bounds.half_area() + TRAVERSAL_COST < count as f32 =>
         {
             let middle = partition_by(references, |reference| split.is_left(reference));
-            (middle > 0 && middle < count).then_some(middle).or(Some(count / 2))
+            let middle = if middle > 0 && middle < count { middle } else { count / 2 };
+            Some((middle, false))
         }
         None if count > LEAF_SIZE => {
             let axis = longest_axis(centroids.extent());
             references.select_nth_unstable_by(count / 2, |a, b| {
                 a.centroid()[axis].total_cmp(&b.centroid()[axis]).then(a.id.cmp(&b.id))
             });
-            Some(count / 2)
+            Some((count / 2, false))
         }
         _ => None,
     }
+}
+
+/// Moves the smaller half of the boxes to the front and returns their number.
+fn smaller_half(references: &mut [Reference]) -> usize {
+    let middle = references.len() / 2;
+    references.select_nth_unstable_by(middle, |a, b| {
+        a.bounds.half_area().total_cmp(&b.bounds.half_area()).then(a.id.cmp(&b.id))
+    });
+    middle
+}
+
+/// Whether a split by size is much cheaper than the best plane, which leaves boxes of nearly full size on both sides.
+fn is_nested(references: &mut [Reference], bounds: Aabb, split: &Split) -> bool {
+    let count = references.len() as f32;
+    if split.cost < NESTED_COST * bounds.half_area() * count {
+        return false;
+    }
+    let middle = smaller_half(references);
+    let small = references[..middle].iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
+    let cost = small.half_area() * middle as f32 + bounds.half_area() * (count - middle as f32);
+    cost < SIZE_SPLIT_COST * split.cost
 }
 
 /// A plane between two bins of an axis.

@@ -2,12 +2,14 @@
 
 mod build;
 mod packet;
+mod shell;
 mod top_node;
 mod traverse;
 
 use crate::geometry::Aabb;
 
 pub use packet::{AnyTest, ClosestTest};
+pub use shell::{Met, Shell};
 use top_node::TopNode;
 
 /// Maximum number of primitives in a leaf chosen by the surface area heuristic.
@@ -35,6 +37,10 @@ pub struct Bvh {
     depth: usize,
     /// Start of packet traversal.
     top: TopNode,
+    /// Whether many boxes are nested in each other.
+    is_nested: bool,
+    /// The shells of each node's children. `None` if few boxes are nested.
+    shells: Option<Box<[[Shell; 2]]>>,
 }
 
 /// Two children with their boxes, in one cache line.
@@ -64,7 +70,8 @@ impl ChildRef {
 impl Bvh {
     /// Memory used by the tree, in bytes.
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.nodes.as_slice()) + size_of_val(self.order.as_slice())
+        let shells = self.shells.as_deref().map_or(0, size_of_val);
+        size_of_val(self.nodes.as_slice()) + size_of_val(self.order.as_slice()) + shells
     }
 
     /// Checks the tree: every box must contain its subtree, and every id must occur exactly once.

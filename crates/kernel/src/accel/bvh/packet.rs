@@ -161,6 +161,10 @@ impl Bvh {
         closest: &mut impl ClosestTest,
         simd: impl Simd,
     ) {
+        if let Some(shells) = &self.shells {
+            outside.iter().for_each(|&id| closest.test(id, traced, ends));
+            return self.closest_packet_nested(shells, rays, ends, traced, closest);
+        }
         let slabs = SlabPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
         let mut near = PendingSubtrees::sorted(self.top_met(&slabs, ends, traced, simd));
@@ -223,6 +227,10 @@ impl Bvh {
         any: &mut impl AnyTest,
         simd: impl Simd,
     ) -> u32 {
+        if let Some(shells) = &self.shells {
+            let hit = outside.iter().fold(0, |hit, &id| hit | any.test(id, traced, ends));
+            return hit | self.any_packet_nested(shells, rays, ends, traced & !hit, any);
+        }
         let slabs = SlabPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);

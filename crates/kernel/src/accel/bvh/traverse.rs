@@ -14,7 +14,9 @@ impl Bvh {
     /// the caller can break ties by id.
     #[inline]
     pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, f32) -> Option<f32>) {
-        if self.depth < SHALLOW_STACK {
+        if let Some(shells) = &self.shells {
+            self.closest_nested(shells, ray, test);
+        } else if self.depth < SHALLOW_STACK {
             self.closest_within::<SHALLOW_STACK>(ray, test);
         } else {
             self.closest_within::<DEEP_STACK>(ray, test);
@@ -82,7 +84,9 @@ impl Bvh {
     /// Whether `test(id)` returns true for any primitive that the ray may hit.
     #[inline]
     pub fn any(&self, ray: &Ray, test: impl FnMut(u32) -> bool) -> bool {
-        if self.depth < SHALLOW_STACK {
+        if let Some(shells) = &self.shells {
+            self.any_nested(shells, ray, test)
+        } else if self.depth < SHALLOW_STACK {
             self.any_within::<SHALLOW_STACK>(ray, test)
         } else {
             self.any_within::<DEEP_STACK>(ray, test)

@@ -2,7 +2,7 @@
 
 use crate::materials::Dielectric;
 use crate::math::Vec3;
-use crate::world::World;
+use crate::world::{MAX_INTERIORS, World};
 
 /// A glass solid around a ray. The parts of one solid may have different materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -17,7 +17,7 @@ pub struct Interior {
 /// full, the first ones are dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InteriorList {
-    inside: [Interior; 4],
+    inside: [Interior; MAX_INTERIORS],
     /// Number of recorded solids. It takes a whole word because copying a word of which one byte was just written
     /// stalls.
     count: u32,

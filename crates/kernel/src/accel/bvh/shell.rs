@@ -1,0 +1,309 @@
+//! Spherical shells around nested surfaces. The boxes of concentric spheres all contain a ray that starts between them, and so
+//! cannot tell which surfaces it hits. The shells between the smallest and the largest sphere of a subtree can.
+
+use arrayvec::ArrayVec;
+
+use super::{AnyTest, Bvh, ChildRef, ClosestTest, DEEP_STACK};
+use crate::accel::{F32x16, PACKET_SIZE};
+use crate::geometry::aabb::{SLAB_PAD, SlabRay};
+use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::{Aabb, Ray, RayF64};
+use crate::math::DVec3;
+
+/// Relative error bound of distances and hits, with ample room.
+const ROUNDING: f64 = 1e-6;
+
+/// Squared distance, in outer radii, beyond which rounding makes shells useless.
+const FAR: f64 = 1e12;
+
+/// A region between two spheres with one center. It contains the surfaces of some primitives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shell {
+    center: DVec3,
+    /// Radius of a ball that all of the primitives enclose; negative if there is none.
+    inner: f64,
+    outer: f64,
+}
+
+/// Position of a box relative to a shell.
+enum Position {
+    /// All primitives enclose the box.
+    Enclosed,
+    /// The box may meet a surface.
+    Near,
+    Outside,
+}
+
+impl Shell {
+    /// The shell of no primitive.
+    const EMPTY: Self = Self { center: DVec3::ZERO, inner: f64::INFINITY, outer: f64::NEG_INFINITY };
+
+    /// The shell of a closed sphere.
+    pub fn sphere(center: DVec3, radius: f64) -> Self {
+        Self { center, inner: radius, outer: radius }
+    }
+
+    /// The shell of any primitive, from its bounding box. It has no inner ball.
+    pub fn around(bounds: &Aabb) -> Self {
+        let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        let center = (min + max) * 0.5;
+        Self { center, inner: f64::NEG_INFINITY, outer: (max - center).length() }
+    }
+
+    /// A shell around two shells. It keeps the smaller inner ball, or what the larger one leaves of it.
+    fn union(self, other: Self) -> Self {
+        let (a, b) = if self.inner <= other.inner { (self, other) } else { (other, self) };
+        let apart = a.center.distance(b.center);
+        if b.outer == f64::NEG_INFINITY {
+            return a;
+        }
+        Self { inner: a.inner.min(b.inner - apart), outer: a.outer.max(b.outer + apart), ..a }
+    }
+
+    /// The shell with room for rounding.
+    fn padded(self) -> Self {
+        let room = ROUNDING * (self.outer.max(0.0) + self.center.abs().max_element());
+        Self { inner: self.inner - room, outer: self.outer + room, ..self }
+    }
+
+    /// A lower bound on the distance at which a ray hits a surface in the shell. `None` if it misses the shell.
+    fn entry(&self, ray: &RayF64) -> Option<f32> {
+        let to_origin = ray.origin - self.center;
+        let distance = to_origin.length_squared();
+        let is_inside = self.inner > 0.0 && distance < self.inner * self.inner;
+        let is_outside = distance > self.outer * self.outer;
+        if !(is_inside || is_outside) || distance > FAR * self.outer * self.outer {
+            return Some(0.0);
+        }
+        let a = ray.direction.length_squared();
+        let b = -to_origin.dot(ray.direction);
+        let foot = to_origin + ray.direction * (b / a);
+        let radius = if is_inside { self.inner } else { self.outer };
+        let discriminant = radius * radius - foot.length_squared();
+        if is_outside && (b < 0.0 || discriminant < 0.0) {
+            return None;
+        }
+        let half = (a * discriminant.max(0.0)).sqrt();
+        let t = if is_inside { b + half } else { b - half };
+        Some((t / a * (1.0 - ROUNDING)) as f32)
+    }
+
+    fn position(&self, bounds: &Aabb) -> Position {
+        let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
+        let nearest = self.center.clamp(min, max).distance_squared(self.center);
+        let farthest = (self.center - min).abs().max((self.center - max).abs()).length_squared();
+        if self.inner > 0.0 && farthest < self.inner * self.inner {
+            Position::Enclosed
+        } else if nearest > self.outer * self.outer {
+            Position::Outside
+        } else {
+            Position::Near
+        }
+    }
+}
+
+/// A primitive or a subtree near a box, see [`Bvh::meeting_surfaces`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Met {
+    /// A primitive that may meet the box.
+    Primitive(u32),
+    /// A subtree, by its index in [`Bvh::last_of_subtrees`], of which all primitives enclose the box.
+    Enclosing(usize),
+}
+
+impl Bvh {
+    /// Adds shells if many primitives are nested; `shell` returns the shell of one of them.
+    pub fn with_shells(self, shell: impl Fn(u32) -> Shell) -> Self {
+        if !self.is_nested {
+            return self;
+        }
+        let shells = self.of_subtrees(Shell::EMPTY, shell, Shell::union);
+        let shells = shells.into_iter().map(|both| both.map(Shell::padded)).collect();
+        Self { shells: Some(shells), ..self }
+    }
+
+    /// The last `N` of the primitives in each subtree for which `counts` is true, in descending order. Empty without shells.
+    pub fn last_of_subtrees<const N: usize>(&self, counts: impl Fn(u32) -> bool) -> Vec<ArrayVec<u32, N>> {
+        if self.shells.is_none() {
+            return Vec::new();
+        }
+        let own = |id: u32| counts(id).then_some(id).into_iter().collect();
+        let join = |a: ArrayVec<u32, N>, b: ArrayVec<u32, N>| {
+            let mut all: Vec<u32> = a.into_iter().chain(b).collect();
+            all.sort_unstable_by(|a, b| b.cmp(a));
+            all.into_iter().take(N).collect()
+        };
+        self.of_subtrees(ArrayVec::new(), own, join).into_iter().flatten().collect()
+    }
+
+    /// Folds a value over the primitives of each subtree.
+    fn of_subtrees<T: Clone>(
+        &self,
+        empty: T,
+        own: impl Fn(u32) -> T,
+        join: impl Fn(T, T) -> T,
+    ) -> Vec<[T; 2]> {
+        let mut values = vec![[empty.clone(), empty.clone()]; self.nodes.len()];
+        // Children follow their parents.
+        for (place, node) in self.nodes.iter().enumerate().rev() {
+            for side in (0..2).filter(|&side| !node.bounds[side].is_empty()) {
+                let ChildRef { first, count } = node.child[side];
+                values[place][side] = if count == 0 {
+                    let [left, right] = values[first as usize].clone();
+                    join(left, right)
+                } else {
+                    let ids = &self.order[first as usize..(first + count) as usize];
+                    ids.iter().map(|&id| own(id)).fold(empty.clone(), &join)
+                };
+            }
+        }
+        values
+    }
+
+    /// Visits every primitive whose surface may meet a box, until `visit` returns false. Subtrees of which all primitives enclose
+    /// the box are visited as one. Without shells, visits the same as [`Bvh::meeting`].
+    pub fn meeting_surfaces(&self, other: &Aabb, mut visit: impl FnMut(Met) -> bool) {
+        let Some(shells) = &self.shells else {
+            let mut goes_on = true;
+            return self.meeting(other, |id| goes_on = goes_on && visit(Met::Primitive(id)));
+        };
+        let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
+        stack.push(ChildRef { first: 0, count: 0 });
+        while let Some(ChildRef { first, count }) = stack.pop() {
+            if count > 0 {
+                let ids = &self.order[first as usize..(first + count) as usize];
+                if !ids.iter().all(|&id| visit(Met::Primitive(id))) {
+                    return;
+                }
+                continue;
+            }
+            let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
+            for side in (0..2).filter(|&side| node.bounds[side].meets(other)) {
+                match shells[side].position(other) {
+                    Position::Outside => {}
+                    Position::Near => stack.push(node.child[side]),
+                    Position::Enclosed if visit(Met::Enclosing(2 * first as usize + side)) => {}
+                    Position::Enclosed => return,
+                }
+            }
+        }
+    }
+
+    /// [`Bvh::closest`] with shells.
+    #[inline(never)]
+    pub(super) fn closest_nested(
+        &self,
+        shells: &[[Shell; 2]],
+        ray: &Ray,
+        mut test: impl FnMut(u32, f32) -> Option<f32>,
+    ) {
+        let mut t_max = ray.t_max;
+        let enter = NestedRay::new(ray);
+        let mut stack = ArrayVec::<(f32, ChildRef), { DEEP_STACK + 1 }>::new();
+        stack.push((0.0, ChildRef { first: 0, count: 0 }));
+        while let Some((entry, ChildRef { first, count })) = stack.pop() {
+            if !(entry <= t_max * SLAB_PAD) {
+                continue;
+            }
+            if count > 0 {
+                for &id in &self.order[first as usize..(first + count) as usize] {
+                    t_max = test(id, t_max).unwrap_or(t_max);
+                }
+                continue;
+            }
+            let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
+            let [left, right] = [0, 1].map(|side| enter.entry(&node.bounds[side], &shells[side], t_max));
+            let children = [(left, node.child[0]), (right, node.child[1])];
+            let far_first = if right < left { children } else { [children[1], children[0]] };
+            stack.extend(far_first.into_iter().filter_map(|(entry, child)| Some((entry?, child))));
+        }
+    }
+
+    /// [`Bvh::any`] with shells.
+    #[inline(never)]
+    pub(super) fn any_nested(
+        &self,
+        shells: &[[Shell; 2]],
+        ray: &Ray,
+        mut test: impl FnMut(u32) -> bool,
+    ) -> bool {
+        let enter = NestedRay::new(ray);
+        let mut stack = ArrayVec::<ChildRef, { DEEP_STACK + 1 }>::new();
+        stack.push(ChildRef { first: 0, count: 0 });
+        while let Some(ChildRef { first, count }) = stack.pop() {
+            if count > 0 {
+                let ids = &self.order[first as usize..(first + count) as usize];
+                if ids.iter().any(|&id| test(id)) {
+                    return true;
+                }
+                continue;
+            }
+            let (node, shells) = (&self.nodes[first as usize], &shells[first as usize]);
+            let is_met = |side: &usize| enter.entry(&node.bounds[*side], &shells[*side], ray.t_max).is_some();
+            stack.extend((0..2).filter(is_met).map(|side| node.child[side]));
+        }
+        false
+    }
+
+    /// [`Bvh::closest_packet`] with shells: traces the rays one by one.
+    #[inline(never)]
+    pub(super) fn closest_packet_nested(
+        &self,
+        shells: &[[Shell; 2]],
+        rays: &RayPacket,
+        ends: &mut F32x16,
+        traced: u32,
+        closest: &mut impl ClosestTest,
+    ) {
+        for lane in lanes(traced).take(PACKET_SIZE) {
+            let ray = Ray { t_max: ends[lane], ..rays.ray(lane) };
+            self.closest_nested(shells, &ray, |id, _| {
+                closest.test(id, 1 << lane, ends);
+                Some(ends[lane])
+            });
+        }
+    }
+
+    /// [`Bvh::any_packet`] with shells: traces the rays one by one.
+    #[inline(never)]
+    pub(super) fn any_packet_nested(
+        &self,
+        shells: &[[Shell; 2]],
+        rays: &RayPacket,
+        ends: &F32x16,
+        traced: u32,
+        any: &mut impl AnyTest,
+    ) -> u32 {
+        let mut hit = 0;
+        for lane in lanes(traced).take(PACKET_SIZE) {
+            let ray = Ray { t_max: ends[lane], ..rays.ray(lane) };
+            let is_hit = self.any_nested(shells, &ray, |id| any.test(id, 1 << lane, ends) & 1 << lane != 0);
+            hit |= u32::from(is_hit) << lane;
+        }
+        hit
+    }
+}
+
+/// A ray prepared for boxes and shells.
+struct NestedRay {
+    slabs: SlabRay,
+    line: RayF64,
+}
+
+impl NestedRay {
+    fn new(ray: &Ray) -> Self {
+        Self { slabs: SlabRay::new(ray.origin, ray.direction), line: ray.to_f64() }
+    }
+
+    /// A lower bound on the distance at which the ray hits a surface. `None` if it misses the box or the shell.
+    fn entry(&self, bounds: &Aabb, shell: &Shell, t_max: f32) -> Option<f32> {
+        let of_box = self.slabs.enter(bounds.min, bounds.max, t_max)?;
+        let of_shell = shell.entry(&self.line)?;
+        let entry = if of_shell > of_box { of_shell } else { of_box };
+        (entry <= t_max * SLAB_PAD).then_some(entry)
+    }
+}
+
+#[cfg(test)]
+#[path = "shell_tests.rs"]
+mod tests;

@@ -1,0 +1,169 @@
+use super::*;
+use crate::control::CancelToken;
+use crate::geometry::sphere::Sphere;
+use crate::math::Vec3;
+use crate::math::random::signed as random;
+
+/// Nested spheres, not in order of size, with centers up to `spread` apart, and as many small ones around them.
+fn spheres(count: u32, spread: f32) -> Vec<Sphere> {
+    let mut next = random(5);
+    let mut vector = |size: f32| (Vec3::new(next(), next(), next()) * size).as_dvec3();
+    let nested = (0..count).map(|i| {
+        let radius = 1.0 + f64::from(i * 7 % count) / f64::from(count);
+        Sphere { center: vector(spread) + DVec3::X, radius }
+    });
+    let nested: Vec<_> = nested.collect();
+    nested.into_iter().chain((0..count).map(|_| Sphere { center: vector(4.0), radius: 0.01 })).collect()
+}
+
+fn tree(spheres: &[Sphere]) -> Bvh {
+    let boxes: Vec<_> = spheres.iter().map(Sphere::bounds).collect();
+    let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
+    tree.validate(&boxes).expect("a sound tree");
+    tree.with_shells(|id| Shell::sphere(spheres[id as usize].center, spheres[id as usize].radius))
+}
+
+/// Rays from inside, between and outside the spheres, some tangential.
+fn rays(count: usize) -> Vec<Ray> {
+    let mut next = random(9);
+    let mut vector = |size: f32| Vec3::new(next(), next(), next()) * size;
+    let ray = |i: usize| {
+        let origin = Vec3::X + vector([0.1, 1.5, 6.0][i % 3]);
+        let target = if i.is_multiple_of(2) { Vec3::X + vector(1.4) } else { origin + vector(1.0) };
+        let ray = Ray::new(origin, target - origin);
+        if i.is_multiple_of(5) { Ray { t_max: 0.7, ..ray } } else { ray }
+    };
+    (0..count).map(ray).collect()
+}
+
+/// The nearest hit, and the number of tested spheres.
+fn closest(tree: &Bvh, spheres: &[Sphere], ray: &Ray) -> (Option<(f32, u32)>, usize) {
+    let (mut best, mut tests) = (None, 0);
+    tree.closest(ray, |id, t_max| {
+        tests += 1;
+        let t = spheres[id as usize].intersect(&Ray { t_max, ..*ray }.to_f64())?.t;
+        best = best.filter(|best| *best < (t, id)).or(Some((t, id)));
+        best.map(|(t, _)| t)
+    });
+    (best, tests)
+}
+
+fn brute(spheres: &[Sphere], ray: &Ray) -> Option<(f32, u32)> {
+    let hits = spheres.iter().zip(0..).filter_map(|(own, id)| Some((own.intersect(&ray.to_f64())?.t, id)));
+    hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+}
+
+/// Tests each sphere of a packet as a single ray would.
+struct Packet<'a> {
+    spheres: &'a [Sphere],
+    rays: &'a [Ray],
+    best: [Option<(f32, u32)>; PACKET_SIZE],
+}
+
+impl ClosestTest for Packet<'_> {
+    fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
+        for lane in lanes(met) {
+            let ray = Ray { t_max: ends[lane], ..self.rays[lane] };
+            let Some(hit) = self.spheres[id as usize].intersect(&ray.to_f64()) else { continue };
+            let best = self.best[lane].filter(|best| *best < (hit.t, id)).unwrap_or((hit.t, id));
+            (self.best[lane], ends[lane]) = (Some(best), best.0);
+        }
+    }
+}
+
+impl AnyTest for Packet<'_> {
+    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
+        let is_hit = |lane: &usize| {
+            let ray = Ray { t_max: ends[*lane], ..self.rays[*lane] };
+            self.spheres[id as usize].intersect(&ray.to_f64()).is_some()
+        };
+        lanes(met).filter(is_hit).map(|lane| 1 << lane).sum()
+    }
+}
+
+#[test]
+fn nested_hits_match_brute_force() {
+    for spread in [0.0, 1e-4, 0.02] {
+        let spheres = spheres(200, spread);
+        let tree = tree(&spheres);
+        assert!(tree.shells.is_some(), "{spread}");
+        for rays in rays(800).chunks(PACKET_SIZE) {
+            let expected: Vec<_> = rays.iter().map(|ray| brute(&spheres, ray)).collect();
+            let (packet, mut ends) = RayPacket::new(rays);
+            let traced = (1 << rays.len()) - 1;
+            let mut tests = Packet { spheres: &spheres, rays, best: [None; PACKET_SIZE] };
+            let simd = crate::math::lanes::PortableSimd;
+            let any = tree.any_packet(&packet, &ends, traced, &[], &mut tests, simd);
+            tree.closest_packet(&packet, &mut ends, traced, &[], &mut tests, simd);
+            for (lane, (ray, expected)) in rays.iter().zip(&expected).enumerate() {
+                assert_eq!(closest(&tree, &spheres, ray).0, *expected, "{ray:?}");
+                assert_eq!(tests.best[lane], *expected, "{ray:?}");
+                let is_hit = |id: u32| spheres[id as usize].intersect(&ray.to_f64()).is_some();
+                let found = [tree.any(ray, is_hit), any & 1 << lane != 0];
+                assert_eq!(found, [expected.is_some(); 2], "{ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn nested_box_queries_match_brute_force() {
+    for spread in [0.0, 1e-4, 0.02] {
+        let spheres = spheres(200, spread);
+        let tree = tree(&spheres);
+        let last = tree.last_of_subtrees::<3>(|id| id.is_multiple_of(2));
+        let mut next = random(3);
+        for i in 0..500 {
+            let at = Vec3::X + Vec3::new(next(), next(), next()) * 2.0;
+            let near = Aabb { min: at, max: at }.grown(Vec3::splat([1e-5, 0.1][i % 2]));
+            let (mut visited, mut enclosing) = (Vec::new(), Vec::new());
+            tree.meeting_surfaces(&near, |met| {
+                match met {
+                    Met::Primitive(id) => visited.push(id),
+                    Met::Enclosing(subtree) => enclosing.extend(&last[subtree]),
+                }
+                true
+            });
+            let corners = [near.min, near.max].map(|corner| corner.as_dvec3());
+            for (sphere, id) in spheres.iter().zip(0..) {
+                let nearest = sphere.center.clamp(corners[0], corners[1]).distance(sphere.center);
+                let farthest = corners.map(|corner| (sphere.center - corner).abs());
+                let farthest = farthest[0].max(farthest[1]).length();
+                if nearest <= sphere.radius && sphere.radius <= farthest {
+                    assert!(visited.contains(&id), "{id} at {at}");
+                }
+            }
+            // The last of all that enclose the box are among the visited ones.
+            let encloses = |id: &u32| spheres[*id as usize].contains(at.as_dvec3()) && id.is_multiple_of(2);
+            let all = (0..spheres.len() as u32).rev().filter(encloses);
+            let found: Vec<_> = visited.iter().chain(&enclosing).copied().filter(encloses).collect();
+            assert!(all.take(3).all(|id| found.contains(&id)), "{at}: {found:?}");
+            assert!(enclosing.iter().all(encloses), "{at}");
+        }
+    }
+}
+
+#[test]
+fn work_per_ray_is_logarithmic_in_nested_spheres() {
+    let work = |count: u32| {
+        let spheres = spheres(count, 0.0);
+        let tree = tree(&spheres[..count as usize]);
+        let most = rays(600).iter().map(|ray| closest(&tree, &spheres, ray).1).max().unwrap_or(0);
+        let mut most_met = 0;
+        for ray in rays(600) {
+            let near = Aabb { min: ray.origin, max: ray.origin };
+            let mut met = 0;
+            tree.meeting_surfaces(&near, |_| {
+                met += 1;
+                true
+            });
+            most_met = most_met.max(met);
+        }
+        (most, most_met)
+    };
+    for count in [500, 1000, 2000, 4000, 8000] {
+        let (tests, met) = work(count);
+        let bound = 3 * count.ilog2() as usize;
+        assert!(tests <= bound && met <= bound, "{tests} tests, {met} met of {count}");
+    }
+}
