@@ -399,6 +399,7 @@ pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
 
 /// [`check_neighbours`] with another kind of light.
 pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
+    check_shown_lobes::<R>(points, lit);
     let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
     let mut next = random(31);
     for first in 0..points.len() {
@@ -444,6 +445,40 @@ pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
                 "surface {}",
                 (first + i) % points.len()
             );
+        }
+    }
+}
+
+/// Checks that the lobes have the same bits whether one of them or all are shown, and add up to f. Otherwise the AOVs do not add
+/// up to the beauty image, as rays in narrow lobes divide by small pdfs.
+pub fn check_shown_lobes<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
+    let mut next = random(7);
+    for point in points {
+        for round in 0..400 {
+            let mut turn =
+                |least: f64| direction(least + (1.0 - least) * f64::from(next()), f64::from(next()) * TAU);
+            let (to_eye, any) = (turn(0.05), turn(0.0));
+            let near_mirror = DVec3::new(-to_eye.x, -to_eye.y, to_eye.z) + any * 0.1_f64.powi(round % 5);
+            let way = if round % 2 == 0 { any } else { near_mirror.normalize() };
+            let way = DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3();
+            let place =
+                Place { normal: Vec3::Z * lit.side() as f32, to_eye: to_eye.as_vec3(), tangent: TANGENT };
+            let shown = |diffuse: bool, specular: bool| {
+                let mut row = R::EMPTY;
+                row.reset();
+                row.put(0, point, ShownLobes::Of { diffuse, specular }, &place);
+                let mut light = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
+                set_lane(&mut light, 0, way);
+                let values = row.f(&light);
+                let [wide, narrow] = row.parts(&light, &values);
+                [lane(&values.f, 0), lane(&wide, 0), lane(&narrow, 0)]
+            };
+            let ([f, wide, narrow], of_wide, of_narrow) =
+                (shown(true, true), shown(true, false), shown(false, true));
+            assert_eq!([of_wide[1], of_narrow[2]], [wide, narrow], "{to_eye} {way}");
+            assert_eq!([of_wide[2], of_narrow[1]], [Vec3::ZERO; 2], "{to_eye} {way}");
+            let rest = (of_wide[0] + of_narrow[0] - f).abs().max_element();
+            assert!(rest <= 2.0 * f32::EPSILON * f.max_element(), "{to_eye} {way}: {f} without {rest}");
         }
     }
 }

@@ -149,10 +149,19 @@ impl PhongBsdf {
 
 #[cfg(test)]
 mod tests {
+    use super::super::lobe_tests::{LitFrom, check_shown_lobes};
     use super::*;
 
     fn glossy(shininess: f32) -> PhongBsdf {
         PhongBsdf { diffuse: Vec3::ZERO, specular: Vec3::ONE, shininess, ambient: Vec3::ZERO }
+    }
+
+    #[test]
+    fn lobes_have_the_same_bits_in_all_views() {
+        let (diffuse, specular) = (Vec3::new(0.4, 0.2, 0.1), Vec3::splat(0.5));
+        let points = [0.0, 1.0, 40.0, 1e4, 1e6];
+        let points = points.map(|shininess| PhongBsdf { diffuse, specular, shininess, ambient: Vec3::ZERO });
+        check_shown_lobes::<PhongRow>(&points, LitFrom::Mirrored);
     }
 
     fn reflected(shininess: f32, to_eye: Vec3, to_light: Vec3) -> f32 {

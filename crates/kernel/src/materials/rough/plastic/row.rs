@@ -227,8 +227,11 @@ impl RoughRow for PlasticRow {
         let (mut wide, mut narrow) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         for axis in 0..3 {
             for i in 0..PACKET_SIZE {
-                wide[axis][i] = self.base[axis][i] * (values.shared[1][i] * self.shown[0][i]);
-                let rest = values.f[axis][i] - wide[axis][i];
+                let base = self.base[axis][i] * values.shared[1][i];
+                wide[axis][i] = base * self.shown[0][i];
+                // Subtract the diffuse lobe from the sum of both, whatever is shown: the coat then has the same bits in all views.
+                let hidden = base * (1.0 - self.shown[0][i] - self.unit[i]);
+                let rest = values.f[axis][i] + hidden - (wide[axis][i] + hidden);
                 narrow[axis][i] = if rest > 0.0 { rest } else { 0.0 };
             }
         }
