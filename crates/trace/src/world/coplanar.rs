@@ -250,11 +250,10 @@ fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: 
     }
 }
 
-/// Whether to lift the light off the face, along the light's normal. The light stays if the face emits to that side as well, or if
-/// the light is two-sided and precedes the face: the lower index then wins.
+/// Whether to lift the light off the face, along the light's normal, which hides the back of a two-sided light. The light stays if the
+/// face emits to that side as well.
 fn is_lifted(light: &Face, face: &Face) -> bool {
-    let is_first = light.emits == Some(EmissionSides::Both) && light.object < face.object;
-    !is_first && !face.emits_along(light.normal)
+    !face.emits_along(light.normal)
 }
 
 /// Whether two faces are coplanar and overlap.

@@ -269,7 +269,7 @@ fn ends_within(met: u32, ends: &F32x16) -> F32x16 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::Arc;
 
     use super::*;
@@ -346,7 +346,8 @@ mod tests {
         }
     }
 
-    fn assert_packets(geometry: &Geometry) {
+    /// Compares packets of random rays with single rays.
+    pub(in crate::world) fn assert_packets(geometry: &Geometry) {
         let mut next = random(3);
         let (mut hits, mut shadows) = (0, 0);
         for i in 0..3000 {
