@@ -1,5 +1,5 @@
-//! Fuzzing: `check` on randomly changed scenes and assets. No crash, no hang, exit codes 0 and 2 only, little memory, nothing on
-//! the screen that a terminal would act on.
+//! Fuzzing: runs `check` on randomly changed scenes and assets. It never crashes or hangs, exits only with 0 or 2, uses little
+//! memory, and prints nothing that a terminal would interpret.
 //!
 //! The short version runs with the suite. The long one takes about ten minutes on two cores:
 //!
@@ -7,9 +7,9 @@
 //! GLIMT_FUZZ_CASES=20000,5000,500 cargo test --profile quick --test suite fuzz -- --nocapture
 //! ```
 //!
-//! The numbers are those of scenes and of assets that the library checks in worker processes, and of each kind that the program
-//! itself checks. `GLIMT_FUZZ_SEED` (a whole number, 1 by default) chooses other files. The same seed gives the same files;
-//! those that fail are kept in the folder that the message names.
+//! The numbers are the scenes and the assets that the library checks in worker processes, and the files of each kind that the
+//! program checks. `GLIMT_FUZZ_SEED` (an integer, 1 by default) selects other files. The same seed gives the same files; files that
+//! fail are kept in the folder named by the message.
 
 mod change;
 mod program;

@@ -1,8 +1,8 @@
-//! Characters of the picture, by the terminal's name for itself.
+//! Characters used for the preview, depending on the terminal's name.
 
 use super::pty::{Folder, SCENE};
 
-/// A board seen from the side: its edges are oblique.
+/// A board seen from the side, with oblique edges.
 fn oblique() -> String {
     SCENE.replace("[camera]", "[camera]\nup = [0.3, 1, 0]")
 }
@@ -15,7 +15,7 @@ fn has_finer_blocks(screen: &vt100::Screen) -> bool {
 }
 
 #[test]
-fn a_terminal_that_tells_its_name_gets_its_finest_blocks() {
+fn named_terminal_gets_its_finest_blocks() {
     let folder = Folder::new();
     folder.write("scene.toml", &oblique());
     let mut terminal = folder.terminal();
@@ -29,7 +29,7 @@ fn a_terminal_that_tells_its_name_gets_its_finest_blocks() {
 }
 
 #[test]
-fn the_option_decides_whatever_the_terminal_says() {
+fn preview_option_overrides_the_terminal() {
     let folder = Folder::new();
     folder.write("scene.toml", &oblique());
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml", "--preview", "halfblock"], &[]);
@@ -41,7 +41,7 @@ fn the_option_decides_whatever_the_terminal_says() {
 }
 
 #[test]
-fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
+fn pixel_preview_keeps_the_text_readable() {
     let answers = [
         ("kitty", "\x1b_Gi=4211;OK\x1b\\"),
         ("sixel", "\x1b[?62;4c"),
@@ -54,14 +54,14 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
         terminal.wait_for_render(1);
         terminal.press(answer);
         terminal.resize(120, 24);
-        // The first column of the picture, which the help leaves free.
+        // The first column of the preview, which the help leaves free.
         let has_blocks = |screen: &vt100::Screen| {
             let own = vt100::Color::Default;
             screen.cell(10, 0).is_some_and(|cell| cell.fgcolor() != own || cell.bgcolor() != own)
         };
         terminal.wait("pixels", |screen| !has_blocks(screen));
         terminal.press("?");
-        terminal.wait("half blocks beside the help", has_blocks);
+        terminal.wait("half blocks next to the help", has_blocks);
         terminal.press("?");
         terminal.wait("pixels again", |screen| !has_blocks(screen));
         terminal.press("q");
@@ -70,7 +70,7 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
 }
 
 #[test]
-fn a_terminal_without_pixels_shows_half_blocks_and_says_so() {
+fn unsupported_pixels_fall_back_to_half_blocks() {
     for (protocol, variables, words) in [
         ("kitty", &[][..], "shows no kitty images"),
         ("sixel", &[], "shows no sixel images"),
@@ -80,7 +80,7 @@ fn a_terminal_without_pixels_shows_half_blocks_and_says_so() {
         let folder = Folder::new();
         let call = [folder.program(), "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, variables);
-        // The terminal has answered all questions, and none about images.
+        // The terminal has replied to all queries, but to none about images.
         terminal.press("\x1b[?62;22c");
         terminal.wait_for(words);
         terminal.wait_for_render(1);

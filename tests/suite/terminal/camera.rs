@@ -1,15 +1,15 @@
-//! The camera by keys, as seen on the screen and on disk.
+//! Moving the camera with keys, as seen on the screen and on disk.
 
 use super::pty::{Colors, Folder, Terminal};
 
-/// Waits for a picture with at least, or less than, so many red cells.
+/// Waits for a preview whose number of red cells satisfies `holds`.
 #[track_caller]
 fn wait_for_red(terminal: &Terminal, what: &str, holds: impl Fn(usize) -> bool) {
     terminal.wait(what, |screen| holds(Colors::of(screen).red));
 }
 
 #[test]
-fn the_camera_moves_and_goes_back_and_nothing_is_written() {
+fn moved_camera_resets_without_writing() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -39,7 +39,7 @@ fn the_camera_moves_and_goes_back_and_nothing_is_written() {
 }
 
 #[test]
-fn a_moved_camera_is_written_when_asked_and_is_that_of_the_call() {
+fn saved_image_has_the_moved_camera() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -51,7 +51,7 @@ fn a_moved_camera_is_written_when_asked_and_is_that_of_the_call() {
 }
 
 #[test]
-fn the_exposure_is_written_when_asked() {
+fn saved_image_has_the_changed_exposure() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);

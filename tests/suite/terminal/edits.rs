@@ -1,8 +1,8 @@
-//! Each kind of edit, and the stages that run again for it: by the lines of stages on the screen, and in the report.
+//! Each kind of edit and the stages that it reruns, from the stage lines on the screen and from the report.
 
 use super::pty::{Folder, SCENE, Terminal};
 
-/// A triangle beside the board.
+/// A triangle next to the board.
 const OBJ: &str = "v 1.2 0 0\nv 1.4 0 0\nv 1.2 0.5 0\nf 1 2 3\n";
 
 fn paint(color: &str) -> String {
@@ -31,7 +31,7 @@ fn folder(text: &str) -> Folder {
     folder
 }
 
-/// At work on the scene, with room for every line.
+/// The program rendering the scene, with room for every line.
 fn terminal(folder: &Folder) -> Terminal {
     let call = [folder.program(), "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
@@ -39,7 +39,7 @@ fn terminal(folder: &Folder) -> Terminal {
     terminal
 }
 
-/// `d`one, `r`eused or `s`kipped for each stage in order, and the message of the stage of this name.
+/// `d`one, `r`eused or `s`kipped for each stage in order, and the message of the stage with this name.
 fn stages(folder: &Folder, name: &str) -> (String, String) {
     let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
     let stages = report["stages"].as_array().expect("stages");
@@ -49,7 +49,7 @@ fn stages(folder: &Folder, name: &str) -> (String, String) {
 }
 
 #[test]
-fn each_edit_makes_again_what_depends_on_it_and_nothing_else() {
+fn edits_rerun_only_dependent_stages() {
     let own = scene();
     let folder = folder(&own);
     let terminal = terminal(&folder);
@@ -87,12 +87,12 @@ fn each_edit_makes_again_what_depends_on_it_and_nothing_else() {
             renders += 1;
             terminal.wait_for_render(renders);
             let (statuses, said) = stages(&folder, stage);
-            // Going back finds the trees and the picture of before.
+            // Undoing the edit finds the earlier trees and image.
             let is_of_light = expected.is_none() && from == "[20, 20, 20]";
             let back = if is_of_light { "drrrdsrd" } else { "drrrrsrd" };
             assert_eq!(statuses, expected.unwrap_or(back), "{to}");
             assert!(said.contains(why), "{to}: {said}");
-            // In full, or in short where the line has no room.
+            // The full text, or the short one if the line has no room.
             let count = statuses.matches('r').count();
             let words =
                 [format!("{count} reused"), format!("{count} stages reused"), "1 stage reused".to_owned()];
@@ -110,7 +110,7 @@ fn each_edit_makes_again_what_depends_on_it_and_nothing_else() {
     assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 kept".to_owned()));
 }
 
-/// Waits until all of these lines of stages are there.
+/// Waits until all of these stage lines appear.
 #[track_caller]
 fn wait_for_stages(terminal: &Terminal, lines: &[(&str, &str, &str)]) {
     for (sign, name, status) in lines {
@@ -123,7 +123,7 @@ fn wait_for_stages(terminal: &Terminal, lines: &[(&str, &str, &str)]) {
 }
 
 #[test]
-fn each_stage_says_what_became_of_it_while_the_picture_is_rendered() {
+fn stages_report_their_state_while_rendering() {
     let own = scene().replace("samples = 4", "samples = 10000000");
     let folder = folder(&own);
     let terminal = terminal(&folder);
@@ -141,7 +141,7 @@ fn each_stage_says_what_became_of_it_while_the_picture_is_rendered() {
     let saved = [("=", "parse", "reused"), kept, ("✓", "textures", " "), ("=", "accel", "reused"), rendering];
     wait_for_stages(&terminal, &saved);
 
-    // Broken during the render, and mended by going back to the first of them.
+    // Break the scene during the render, and repair it by restoring the first version.
     folder.write("scene.toml", "[render");
     terminal.wait_for("the last good scene goes on");
     folder.write("scene.toml", &own);

@@ -1,11 +1,11 @@
-//! Ends of the program, and the state that it leaves.
+//! How the program ends, and the state it leaves behind.
 
 use nix::sys::signal::Signal;
 
 use super::pty::{Folder, SCENE};
 
 #[test]
-fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
+fn keys_and_signals_restore_the_terminal() {
     let folder = Folder::new();
     for (key, code) in [("q", 0), ("\x03", 130)] {
         let mut terminal = folder.terminal();
@@ -40,7 +40,7 @@ fn keys_and_signals_end_it_and_the_terminal_is_given_back() {
 }
 
 #[test]
-fn an_abort_gives_the_terminal_back_and_says_so() {
+fn abort_restores_the_terminal_and_is_reported() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_color("red");
@@ -49,7 +49,7 @@ fn an_abort_gives_the_terminal_back_and_says_so() {
 }
 
 #[test]
-fn it_ends_in_the_middle_of_a_render_and_leaves_the_last_picture() {
+fn quit_while_rendering_keeps_the_last_image() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -62,7 +62,7 @@ fn it_ends_in_the_middle_of_a_render_and_leaves_the_last_picture() {
 }
 
 #[test]
-fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
+fn quit_after_save_writes_or_reports() {
     let folder = Folder::new();
     let slow = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &slow);
@@ -85,9 +85,9 @@ fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
     assert!(!folder.path("scene.png").exists());
 }
 
-/// Whether the write has begun depends on the machine; the picture is never lost.
+/// Whether the write has begun depends on the machine; the image is never lost.
 #[test]
-fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
+fn keys_during_a_write_never_lose_the_image() {
     let folder = Folder::new();
     let large = SCENE
         .replace("samples = 4", "samples = 1")
@@ -110,7 +110,7 @@ fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
         assert_eq!(terminal.end(), 0, "{key:?}");
         std::fs::remove_file(folder.path("scene.png")).expect(key);
     }
-    // A write was requested, then quit at once.
+    // Request a write, then quit immediately.
     folder.write("scene.toml", &large.replace("samples = 1", "samples = 100000"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
@@ -120,38 +120,38 @@ fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
 }
 
 #[test]
-fn after_a_dropped_line_it_goes_on_where_it_was() {
+fn render_resumes_after_a_dropped_connection() {
     let folder = Folder::new();
     let slow = SCENE.replace("samples = 4", "samples = 4000");
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
     terminal.wait_for("ETA");
-    // The system sends it, and a shell passes it on to its jobs, whatever they are at.
+    // The system sends the signal, and a shell passes it on to its jobs at any time.
     for _ in 0..100 {
         terminal.signal(Signal::SIGHUP);
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     assert_eq!(terminal.end(), 129);
     let checkpoint = folder.path("scene.png.checkpoint");
-    assert!(checkpoint.is_file(), "what was rendered is kept");
-    // Another scene leaves it alone and begins anew.
+    assert!(checkpoint.is_file(), "the samples are saved");
+    // A different scene leaves the checkpoint alone and starts over.
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 4000\nseed = 7"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
     assert!(checkpoint.is_file());
-    // The same one goes on, ends with the same pixels, and clears up.
+    // The same scene resumes, ends with the same pixels, and removes the checkpoint.
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
     terminal.wait_for("resuming from");
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
-    terminal.wait("the checkpoint to go", |_| !checkpoint.exists());
+    terminal.wait("the checkpoint's removal", |_| !checkpoint.exists());
 }
 
 #[test]
-fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
+fn ctrl_z_suspends_and_fg_resumes() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_with(&["/bin/sh", "-i"], &[("PS1", "shell> ")]);
     terminal.wait_for("shell> ");
@@ -163,21 +163,21 @@ fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
         !screen.alternate_screen() && !screen.hide_cursor() && is_asked
     };
     terminal.wait("the shell", is_shell);
-    // The shell answers, so that the terminal's modes are its own; the sum is not in what was typed.
+    // If the shell echoes the result, the terminal's modes are its own; the sum does not appear in the typed text.
     terminal.press("echo $((40 + 2))th\n");
     terminal.wait_for("42th");
     terminal.press("fg\n");
     terminal.wait("the picture", |screen| screen.alternate_screen());
     terminal.wait_for_color("red");
     terminal.press("q");
-    // The program still gets what is typed before its end.
+    // The program still receives keys typed before it ends.
     terminal.wait("the shell", is_shell);
     terminal.press("exit\n");
     assert_eq!(terminal.end(), 0);
 }
 
 #[test]
-fn ctrl_z_without_a_shell_says_so() {
+fn ctrl_z_without_a_shell_is_reported() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");

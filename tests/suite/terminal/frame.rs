@@ -1,11 +1,12 @@
-//! The frame of the window, the clipboard, links: what is sent to which terminal, and that nothing of it stays behind.
+//! Window title, progress, notifications, links and the clipboard: which terminal gets them, and that they are reset.
 
 use nix::sys::signal::Signal;
 
 use super::pty::{Colors, Folder, SCENE, Terminal};
 use super::relay::Answers;
 
-/// Terminals by their variables, with what each has: a title, progress, a protocol of notifications, links, a clipboard.
+/// Terminals by their environment variables, each with its features: title, progress, a notification protocol, links,
+/// clipboard.
 const KNOWN: [(&[(&str, &str)], Has); 5] = [
     (
         &[("TERM", "xterm-kitty")],
@@ -23,7 +24,7 @@ const KNOWN: [(&[(&str, &str)], Has); 5] = [
     (&[("VTE_VERSION", "7600")], Has { progress: false, notice: b"\x07", clipboard: false, ..ALL }),
 ];
 
-/// Terminals that are not known to have any of it.
+/// Terminals not known to have any of these features.
 const OTHERS: [&[(&str, &str)]; 6] = [
     &[],
     &[("TERM", "dumb"), ("WT_SESSION", "1-2-3")],
@@ -43,7 +44,7 @@ struct Has {
 
 const ALL: Has = Has { progress: true, notice: b"", links: true, clipboard: true };
 
-/// Whether these bytes are among the others.
+/// Whether a byte string contains another.
 fn has(bytes: &[u8], part: &[u8]) -> bool {
     place(bytes, part).is_some()
 }
@@ -52,7 +53,7 @@ fn place(bytes: &[u8], part: &[u8]) -> Option<usize> {
     bytes.windows(part.len()).position(|window| window == part)
 }
 
-/// Whether the last of the first bytes comes before the last of the others.
+/// Whether the last occurrence of one byte string precedes the last occurrence of another.
 fn is_last(bytes: &[u8], before: &[u8], after: &[u8]) -> bool {
     let last = |part: &[u8]| bytes.windows(part.len()).rposition(|window| window == part);
     last(after).is_some_and(|after| last(before).is_none_or(|before| before < after))
@@ -63,12 +64,12 @@ fn endless() -> String {
     SCENE.replace("samples = 4", "samples = 10000000")
 }
 
-/// The program on the scene, where every end of a render is worth a notification.
+/// Starts the program so that every finished render triggers a notification.
 fn open(folder: &Folder, variables: &[(&str, &str)]) -> Terminal {
     folder.terminal_with(&[folder.program(), "scene.toml", "--notify-after", "0.001"], variables)
 }
 
-/// Makes the program do all that is sent: a render until there is a title, its end without the focus, a click, a copy. Returns
+/// Makes the program send everything: a render until there is a title, its end without focus, a click, a copy. Returns
 /// all bytes until the end.
 fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     let folder = Folder::new();
@@ -78,7 +79,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     if has_title {
         terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering 0 %"));
     }
-    // The focus goes. The help comes after it, which shows that it was read before the scene is saved.
+    // Remove the focus. The help that opens afterwards shows that this was read before the scene is saved.
     terminal.press("\x1b[O?");
     terminal.wait_for("show or hide this help");
     terminal.press("?");
@@ -88,7 +89,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     if has_title {
         terminal.wait("its last title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
     }
-    // And comes back. A click on the board, and what it says is copied.
+    // Restore the focus, click on the board, and copy the inspected values.
     terminal.press("\x1b[I");
     terminal.press("\x1b[<0;20;10M\x1b[<0;20;10m");
     terminal.wait_for("radiance (");
@@ -105,7 +106,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
 }
 
 #[test]
-fn each_terminal_gets_what_it_is_known_to_have_and_loses_it_at_the_end() {
+fn known_terminals_get_their_features_and_reset() {
     for (variables, has_what) in KNOWN {
         let bytes = through(variables, true);
         let check = |part: &[u8], is_there: bool| {
@@ -123,16 +124,19 @@ fn each_terminal_gets_what_it_is_known_to_have_and_loses_it_at_the_end() {
         let name = place(&bytes, address).map(|start| &bytes[start + address.len()..][..24]);
         assert_eq!(name.is_some_and(|name| has(name, b"scene.png")), has_what.links, "{variables:?}: a link");
         check(b"\x1b]52;c;", has_what.clipboard);
-        assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"), "{variables:?}: the title goes back");
-        assert!(is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"), "{variables:?}: the focus is not reported");
+        assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"), "{variables:?}: the title is restored");
+        assert!(is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"), "{variables:?}: focus reports end");
         if has_what.progress {
-            assert!(is_last(&bytes, b"\x1b]9;4;1;", b"\x1b]9;4;0;0\x1b\\"), "{variables:?}: no bar stays");
+            assert!(
+                is_last(&bytes, b"\x1b]9;4;1;", b"\x1b]9;4;0;0\x1b\\"),
+                "{variables:?}: the progress bar is removed"
+            );
         }
     }
 }
 
 #[test]
-fn other_terminals_get_nothing_of_it() {
+fn unknown_terminals_get_no_extra_sequences() {
     for variables in OTHERS {
         let bytes = through(variables, false);
         for part in [
@@ -155,7 +159,7 @@ fn other_terminals_get_nothing_of_it() {
 }
 
 #[test]
-fn signals_in_the_middle_of_a_render_leave_no_title_and_no_bar() {
+fn signals_clear_title_and_progress() {
     let folder = Folder::new();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     for (signal, code) in
@@ -177,9 +181,9 @@ fn signals_in_the_middle_of_a_render_leave_no_title_and_no_bar() {
     }
 }
 
-/// Whoever looks at the window needs no notification, nor is a short render worth one.
+/// A focused window needs no notification, and a short render deserves none.
 #[test]
-fn a_notification_is_for_a_long_render_that_nobody_looks_at() {
+fn only_unfocused_long_renders_notify() {
     for (focus, after) in
         [("\x1b[I", "0.001"), ("\x1b[O\x1b[I", "0.001"), ("\x1b[O", "3600"), ("\x1b[O", "0")]
     {
@@ -196,9 +200,9 @@ fn a_notification_is_for_a_long_render_that_nobody_looks_at() {
     }
 }
 
-/// The title and the bar of progress come after the picture, and no more is on the way than without them.
+/// Title and progress follow the preview, and do not increase the number of queued bytes.
 #[test]
-fn over_a_thin_line_the_picture_comes_first() {
+fn slow_connection_sends_the_preview_first() {
     let folder = Folder::new();
     folder.write("scene.toml", &endless());
     let terminal = folder.thin_line_in(Answers::Terminal, &[("WT_SESSION", "1-2-3")]);
@@ -217,7 +221,7 @@ fn over_a_thin_line_the_picture_comes_first() {
 }
 
 #[test]
-fn a_terminal_that_says_its_name_later_gets_what_it_has() {
+fn late_terminal_reply_enables_its_features() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);

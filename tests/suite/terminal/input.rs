@@ -1,4 +1,4 @@
-//! Bursts, pasted text and the terminal's own answers: glimt loses no key, and takes nothing else for one.
+//! Bursts, pasted text and terminal replies: glimt loses no key, and treats nothing else as a key.
 
 use std::time::Duration;
 
@@ -12,11 +12,11 @@ fn pause(milliseconds: u64) {
 }
 
 #[test]
-fn a_key_after_a_burst_is_seen() {
+fn key_after_a_burst_is_handled() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    // Nothing more comes after it: its last key must not wait for more.
+    // Nothing follows: the last key must not wait for more input.
     terminal.burst(UNBOUND.repeat(60_000) + "?");
     terminal.wait_for("show or hide this help");
     terminal.burst(UNBOUND.repeat(60_000) + "q");
@@ -24,7 +24,7 @@ fn a_key_after_a_burst_is_seen() {
 }
 
 #[test]
-fn pasted_text_is_no_keys() {
+fn pasted_text_is_not_keys() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -40,11 +40,11 @@ fn pasted_text_is_no_keys() {
 }
 
 #[test]
-fn nothing_of_a_long_paste_is_a_key() {
+fn long_paste_is_not_keys() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    // Each of these keys does something, the last two write the camera into the scene and end the program.
+    // Each of these keys has an effect; the last two write the camera into the scene and quit.
     terminal.burst(format!("\x1b[200~{}\x1b[201~?", "h?vcq".repeat(300_000)));
     terminal.wait_for("show or hide this help");
     assert_eq!(folder.bytes("scene.toml"), SCENE.as_bytes());
@@ -53,7 +53,7 @@ fn nothing_of_a_long_paste_is_a_key() {
 }
 
 #[test]
-fn a_paste_that_does_not_end_holds_the_keyboard_for_a_second() {
+fn unterminated_paste_ends_after_a_second() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -65,7 +65,7 @@ fn a_paste_that_does_not_end_holds_the_keyboard_for_a_second() {
 }
 
 #[test]
-fn answers_of_the_terminal_are_no_keys_however_they_are_split() {
+fn split_terminal_replies_are_not_keys() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -73,12 +73,12 @@ fn answers_of_the_terminal_are_no_keys_however_they_are_split() {
         ["\x1b[0n", "\x1b[?62;1;22;0c", "\x1b[24;80R", "\x1b[?2026;0$y", "\x1b]11;rgb:0000/0000/0000\x1b\\"]
     {
         terminal.press(answer);
-        // A string in pieces looks like keys, and glimt never requests one.
+        // A split string looks like keys, and glimt never requests one.
         for byte in answer.chars().filter(|_| !answer.starts_with("\x1b]")) {
             terminal.press(&byte.to_string());
             pause(90);
         }
-        // Each of the answers has a `0` in it, which would say something if it were a key.
+        // Each reply contains a `0`, which would show a message if it were a key.
         assert!(!terminal.text().contains("nothing to reset"), "{answer:?}");
     }
     terminal.press("e");
@@ -87,7 +87,7 @@ fn answers_of_the_terminal_are_no_keys_however_they_are_split() {
     terminal.wait_for("nothing to reset");
     terminal.press("?");
     terminal.wait_for("show or hide this help");
-    // An escape character that nothing follows is the key.
+    // An escape character that nothing follows is the Escape key.
     terminal.press("\x1b");
     terminal.wait("no help", |screen| !screen.contents().contains("show or hide this help"));
     terminal.press("q");
@@ -95,8 +95,8 @@ fn answers_of_the_terminal_are_no_keys_however_they_are_split() {
 }
 
 #[test]
-fn strings_and_sequences_that_do_not_end_hold_nothing() {
-    // A terminal for each, as the time goes by in waiting.
+fn unterminated_sequences_do_not_block_keys() {
+    // Use one terminal each, because the test mostly waits.
     let terminals = ["\x1b]0;", "\x1bP", "\x1b[", "\x1bO", "\x1b[1;", "\x1bX", "\u{e9}\x1b"].map(|begun| {
         let folder = Folder::new();
         let mut terminal = folder.terminal();

@@ -1,4 +1,4 @@
-//! Effects of each key, as seen on the screen and on disk.
+//! Effects of each key, on the screen and on disk.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ const UP: &str = "\x1b[A";
 const DOWN: &str = "\x1b[B";
 
 #[test]
-fn settings_change_and_go_back() {
+fn settings_change_and_reset() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -35,7 +35,7 @@ fn settings_change_and_go_back() {
             let expected = folder.once(&options);
             terminal.wait(words, |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == expected));
             assert!(expected != own, "{words} shows");
-            // The own image comes back without a key that changes anything.
+            // The scene's own image returns without a key that changes anything.
             fs::write(folder.path("scene.png"), &own).expect("put back");
         }
     }
@@ -54,7 +54,7 @@ fn settings_change_and_go_back() {
 }
 
 #[test]
-fn views_are_shown_as_they_are_and_written_when_asked() {
+fn views_are_shown_and_saved_on_request() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -63,7 +63,7 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
     terminal.press("v");
     terminal.wait_for("view normal (preview only)");
     terminal.wait_for_render(2);
-    // The board faces the camera: (0, 0, 1) is shown as (n + 1)/2, without a curve.
+    // The board faces the camera: (0, 0, 1) is shown as (n + 1)/2, without a tone curve.
     let board = vt100::Color::Rgb(128, 128, 255);
     terminal.wait("normals", |screen| cells(screen).filter(|cell| upper(cell) == Some(board)).count() > 100);
     assert_eq!(folder.bytes("scene.png"), beauty);
@@ -106,13 +106,13 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
 }
 
 #[test]
-fn a_render_is_held_and_goes_on_and_is_written_meanwhile() {
+fn paused_render_can_be_saved_and_resumed() {
     let folder = Folder::new();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.wait_for("ETA");
-    // Once there is a file, every pixel has a sample.
+    // Once the file exists, every pixel has a sample.
     terminal.press("w");
     terminal.wait("the first picture on disk", |_| folder.path("scene.png").is_file());
     fs::remove_file(folder.path("scene.png")).expect("removed");

@@ -1,10 +1,10 @@
-//! Long renders: checkpoints of a live program, and a merge that waits.
+//! Long renders: checkpoints of the live program, and a merge that waits.
 
 use std::fs;
 
 use super::pty::{Folder, SCENE, Terminal};
 
-/// The scene with so many samples.
+/// The scene with `samples` samples.
 fn scene(samples: u32, rest: &str) -> String {
     SCENE.replace("samples = 4", &format!("samples = {samples}\n{rest}"))
 }
@@ -27,14 +27,14 @@ fn terminal(folder: &Folder, options: &[&str]) -> Terminal {
 }
 
 #[test]
-fn a_checkpoint_that_is_not_used_is_named_and_the_scene_is_not_called_broken() {
+fn ignored_checkpoint_is_named() {
     let is_fine = |terminal: &Terminal, words: &str| {
         terminal.wait_for(words);
         terminal.wait_for_render(1);
         let text = terminal.text();
         assert!(!text.contains("error") && !text.contains("--resume"), "{text}");
     };
-    // More samples than asked for.
+    // The checkpoint has more samples than requested.
     let folder = with_checkpoint(8);
     folder.write("scene.toml", &scene(3, ""));
     let long = terminal(&folder, &[]);
@@ -42,7 +42,7 @@ fn a_checkpoint_that_is_not_used_is_named_and_the_scene_is_not_called_broken() {
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "nothing of it is in the image");
     assert!(folder.path("scene.png.checkpoint").exists(), "it has more than the image");
     drop(long);
-    // Another image; it is said once, not for each edit.
+    // The checkpoint is for another image; this is reported once, not on each edit.
     folder.write("scene.toml", &scene(9, "seed = 5"));
     let other = terminal(&folder, &[]);
     is_fine(&other, "scene.png.checkpoint is not used: seed is 0 there and 5 here");
@@ -62,7 +62,7 @@ fn a_checkpoint_that_is_not_used_is_named_and_the_scene_is_not_called_broken() {
 }
 
 #[test]
-fn a_long_render_that_is_left_is_kept_and_the_last_line_says_so() {
+fn quit_keeps_a_long_render_and_says_so() {
     let folder = Folder::new();
     folder.write("scene.toml", &scene(10_000_000, ""));
     let mut long = terminal(&folder, &["--checkpoint", "0.2"]);
@@ -75,7 +75,7 @@ fn a_long_render_that_is_left_is_kept_and_the_last_line_says_so() {
     again.wait_for("resuming from");
     again.press("q");
     assert_eq!(again.end_saying("continues"), 0);
-    // A short one is not worth it.
+    // A short render is not worth a checkpoint.
     fs::remove_file(folder.path("scene.png.checkpoint")).expect("removed");
     let mut short = terminal(&folder, &["--checkpoint", "1000"]);
     short.wait_for("ETA");
@@ -85,7 +85,7 @@ fn a_long_render_that_is_left_is_kept_and_the_last_line_says_so() {
 }
 
 #[test]
-fn a_merge_that_waits_shows_the_image_as_parts_arrive() {
+fn watching_merge_shows_arriving_parts() {
     let folder = Folder::new();
     let run = |line: &str| {
         let mut process = std::process::Command::new(folder.program());
@@ -112,7 +112,7 @@ fn a_merge_that_waits_shows_the_image_as_parts_arrive() {
     merge.wait_for("wrote joined.png (64×48)");
     let all = cells(&merge);
     assert!(first > 0 && first < second && second < all, "{first}, {second}, {all} cells");
-    // The image and the words are 80 columns wide at most, and no line of them is broken.
+    // Image and text are at most 80 columns wide, and no line of text wraps.
     let text = merge.text();
     assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     assert_eq!(merge.end(), 0);

@@ -1,40 +1,40 @@
-//! The live program in a pseudo-terminal, as a person sees it.
+//! The live program in a pseudo-terminal, as the user sees it.
 
-mod answers;
-mod asking;
 mod blocks;
 mod camera;
+mod camera_steps;
 mod edits;
 mod endings;
-mod eye;
 mod frame;
-mod hands;
+mod history;
+mod inline_output;
 mod input;
+mod inspection;
 mod keys;
-mod leafing;
 mod long;
 mod model;
+mod mouse_and_editor;
 mod outputs;
-#[cfg(target_os = "linux")]
-mod polite;
 pub(crate) mod pty;
 mod relay;
 mod saving;
 mod screen;
+mod scrolling;
 mod sequences;
+mod slow_connection;
 #[cfg(target_os = "linux")]
 mod soak;
-mod strip;
 mod switches;
-mod thin_line;
-mod typos;
+#[cfg(target_os = "linux")]
+mod thread_priority;
+mod unchanged_saves;
 
 use std::fs;
 
 use pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, cells};
 
 #[test]
-fn the_picture_appears_and_is_the_one_that_is_written() {
+fn preview_matches_the_written_image() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_color("red");
@@ -43,7 +43,7 @@ fn the_picture_appears_and_is_the_one_that_is_written() {
 }
 
 #[test]
-fn every_way_of_saving_gives_one_render_and_its_picture() {
+fn each_save_renders_once() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -58,7 +58,7 @@ fn every_way_of_saving_gives_one_render_and_its_picture() {
     terminal.wait_for_color("blue");
     terminal.wait_for_render(3);
 
-    // As vim does it: the old file becomes the backup, a new one is written, the backup goes.
+    // Save as vim does: the old file becomes the backup, a new file is written, and the backup is removed.
     fs::rename(&path, folder.path("scene.toml~")).expect("renamed");
     folder.write("scene.toml", SCENE);
     fs::remove_file(folder.path("scene.toml~")).expect("removed");
@@ -66,7 +66,7 @@ fn every_way_of_saving_gives_one_render_and_its_picture() {
     terminal.wait_for_render(4);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
 
-    // Saving the same content, or a file beside the scene, is no reason to render.
+    // Saving the same content, or a file next to the scene, triggers no render.
     folder.write("scene.toml", SCENE);
     folder.write("notes.txt", "nothing");
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
@@ -75,7 +75,7 @@ fn every_way_of_saving_gives_one_render_and_its_picture() {
 }
 
 #[test]
-fn after_many_fast_saves_the_last_one_is_shown_and_written() {
+fn last_of_many_fast_saves_wins() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -91,7 +91,7 @@ fn after_many_fast_saves_the_last_one_is_shown_and_written() {
 }
 
 #[test]
-fn a_broken_file_shows_the_place_and_the_picture_stays() {
+fn broken_scene_shows_the_position_and_image() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -122,7 +122,7 @@ fn modified(folder: &Folder) -> std::time::SystemTime {
 }
 
 #[test]
-fn a_scene_that_goes_and_comes_back_is_shown_again() {
+fn recreated_scene_is_rendered() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -134,7 +134,7 @@ fn a_scene_that_goes_and_comes_back_is_shown_again() {
 }
 
 #[test]
-fn an_asset_that_changes_is_a_reason_to_render() {
+fn changed_asset_renders_again() {
     let folder = Folder::new();
     let texture = "[textures.paint]\nfile = \"paint.ppm\"\n";
     let scene = SCENE
@@ -152,7 +152,7 @@ fn an_asset_that_changes_is_a_reason_to_render() {
 }
 
 #[test]
-fn the_picture_follows_the_size_of_the_window() {
+fn preview_follows_the_window_size() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -172,7 +172,7 @@ fn the_picture_follows_the_size_of_the_window() {
 }
 
 #[test]
-fn without_colours_the_picture_is_made_of_characters() {
+fn no_color_preview_uses_characters() {
     let folder = Folder::new();
     let terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
     let is_ink = |cell: &vt100::Cell| "=+*#%@$&{}[]?".contains(cell.contents()) && cell.has_contents();

@@ -1,16 +1,16 @@
-//! A model alone, in the terminal.
+//! Showing a model directly in the terminal.
 
 use std::fs;
 
 use super::pty::Folder;
 
-/// An OBJ file of a red wall of this height, one unit wide, that faces the eye.
+/// An OBJ file of a red wall of this height, one unit wide, facing the camera.
 fn wall(height: f32) -> String {
     format!("mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 {height} 0\nv 0 {height} 0\nf 1 2 3 4\n")
 }
 
 #[test]
-fn a_model_saved_again_is_seen_again_and_c_writes_its_scene_once() {
+fn model_is_watched_and_kept_once() {
     let folder = Folder::new();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\nKe 1 0 0\n");
     folder.write("wall.obj", &wall(0.1));
@@ -19,7 +19,7 @@ fn a_model_saved_again_is_seen_again_and_c_writes_its_scene_once() {
     let mut terminal = folder.terminal_with(&call, &[]);
     terminal.wait_for_render(1);
     let low = folder.bytes("wall.png");
-    // Another program saves it.
+    // Another program saves the model.
     folder.write("wall.obj", &wall(0.7));
     terminal.wait_for_render(2);
     let options = &call[2..];
@@ -34,7 +34,7 @@ fn a_model_saved_again_is_seen_again_and_c_writes_its_scene_once() {
     assert_eq!(fs::read_to_string(folder.path("wall.obj")).expect("the model"), wall(0.7));
     terminal.press("c");
     terminal.wait_for("wall.toml exists already, and is left as it is");
-    // A file that is half written, then whole again.
+    // The file is saved incompletely, then completely.
     folder.write("wall.obj", "v 0 0");
     terminal.wait_for("wall.obj");
     terminal.wait_for("broken");
@@ -53,7 +53,7 @@ fn once(folder: &Folder, options: &[&str]) -> Vec<u8> {
 }
 
 #[test]
-fn a_model_that_is_gone_is_named() {
+fn missing_model_is_named() {
     let folder = Folder::new();
     folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\n");
     folder.write("wall.obj", &wall(0.1));

@@ -1,4 +1,4 @@
-//! The live program does not overwrite inputs either: it reports this, and renders on.
+//! The live program does not overwrite inputs either: it reports this and keeps rendering.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::pty::{Folder, GREEN, RED, SCENE};
 
-/// A red picture of one texel.
+/// A red image of one texel.
 const PAINT: &str = "P3\n1 1\n255\n230 20 20\n";
 
 /// The scene with this file as the texture of its board.
@@ -15,13 +15,13 @@ fn textured(file: &str) -> String {
     SCENE.replace(RED, "{ texture = \"paint\" }").replace("[materials]", &texture)
 }
 
-/// Long enough for a loop through the watcher to show.
+/// Waits long enough for a render loop through the watcher to show.
 fn wait_a_while() {
     std::thread::sleep(Duration::from_millis(1500));
 }
 
 #[test]
-fn a_texture_by_the_name_of_the_picture_stays_and_nothing_goes_round() {
+fn texture_named_like_the_image_is_kept() {
     let folder = Folder::new();
     image::RgbImage::from_pixel(2, 2, image::Rgb([230, 20, 20]))
         .save(folder.path("scene.png"))
@@ -48,7 +48,7 @@ fn a_texture_by_the_name_of_the_picture_stays_and_nothing_goes_round() {
 }
 
 #[test]
-fn an_edit_that_makes_the_output_an_input_ends_the_writing() {
+fn output_that_becomes_an_input_is_kept() {
     let folder = Folder::new();
     let terminal = folder.terminal_with(&[folder.program(), "scene.toml", "--report", "r.json"], &[]);
     terminal.wait_for_render(1);
@@ -63,7 +63,7 @@ fn an_edit_that_makes_the_output_an_input_ends_the_writing() {
 }
 
 #[test]
-fn a_photograph_that_takes_the_place_of_the_picture_stays() {
+fn foreign_image_is_not_replaced() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -76,7 +76,7 @@ fn a_photograph_that_takes_the_place_of_the_picture_stays() {
 }
 
 #[test]
-fn a_link_that_changes_during_the_render_is_seen() {
+fn link_changed_while_rendering_is_noticed() {
     let folder = Folder::new();
     folder.write("paint.ppm", PAINT);
     symlink("first.ppm", folder.path("out.ppm")).expect("a link");
@@ -96,7 +96,7 @@ fn a_link_that_changes_during_the_render_is_seen() {
 }
 
 #[test]
-fn what_is_written_beside_the_scene_wakes_nobody() {
+fn own_writes_do_not_trigger_renders() {
     let folder = Folder::new();
     folder.write("paint.ppm", PAINT);
     folder.write("scene.toml", &textured("paint.ppm"));

@@ -1,4 +1,4 @@
-//! A person's terminal: the program inside, its screen, keys.
+//! A pseudo-terminal: the program inside it, its screen, keys.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -16,10 +16,10 @@ use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 
-/// Longest time to wait for anything, on however busy a machine.
+/// Time limit for any wait, however busy the machine is.
 const LIMIT: Duration = Duration::from_secs(60);
 
-/// Variables by which terminals are known.
+/// Environment variables that identify terminals.
 const OF_TERMINALS: [&str; 11] = [
     "TMUX",
     "STY",
@@ -34,7 +34,7 @@ const OF_TERMINALS: [&str; 11] = [
     "LC_TERMINAL_VERSION",
 ];
 
-/// A picture of a red board with a ball in front of it, under a lamp.
+/// A red board with a ball in front of it, under a light.
 pub const SCENE: &str = r#"[render]
 width = 64
 height = 48
@@ -96,7 +96,7 @@ impl Folder {
         fs::read(self.path(name)).expect(name)
     }
 
-    /// The bytes of the picture that a headless run makes of the scene as it is.
+    /// The image that a headless run renders from the current scene.
     pub fn once(&self, options: &[&str]) -> Vec<u8> {
         let mut process = Process::new(PROGRAM);
         process.current_dir(self.0.path()).args(["scene.toml", "--once", "-o", "once.png"]).args(options);
@@ -105,7 +105,7 @@ impl Folder {
         self.bytes("once.png")
     }
 
-    /// The program at work on the scene, in a terminal of 80×24 cells.
+    /// The program rendering the scene, in a terminal of 80×24 cells.
     pub fn terminal(&self) -> Terminal {
         self.terminal_with(&[PROGRAM, "scene.toml"], &[])
     }
@@ -114,7 +114,7 @@ impl Folder {
         Terminal::open(command, variables, self.0.path(), size(80, 24), None)
     }
 
-    /// The program at work on the scene, at the end of a thin line, in a terminal of 120×40 cells.
+    /// The program rendering the scene over a slow connection, in a terminal of 120×40 cells.
     pub fn thin_line(&self, answers: Answers) -> Terminal {
         let tmux: &[_] = if answers == Answers::Multiplexer {
             &[("TMUX", "/tmp/tmux-0/default,1,0"), ("SSH_CONNECTION", "192.0.2.1 5000 192.0.2.2 22")]
@@ -124,12 +124,12 @@ impl Folder {
         self.thin_line_in(answers, tmux)
     }
 
-    /// The same with these variables.
+    /// The same as [`Self::thin_line`], with these environment variables.
     pub fn thin_line_in(&self, answers: Answers, variables: &[(&str, &str)]) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], variables, self.0.path(), size(120, 40), Some(answers))
     }
 
-    /// The program at work on the scene in a terminal of this size.
+    /// The program rendering the scene in a terminal of this size.
     pub fn terminal_of(&self, columns: u16, rows: u16) -> Terminal {
         Terminal::open(&[PROGRAM, "scene.toml"], &[], self.0.path(), size(columns, rows), None)
     }
@@ -147,12 +147,12 @@ impl Folder {
 /// A terminal with a program inside.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
-    // Held so that the terminal's modes can be looked at when the program is gone.
+    // Kept open so that the terminal's modes can be read after the program has ended.
     _slave: Box<dyn SlavePty + Send>,
     child: Box<dyn Child + Send + Sync>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
     screen: Arc<Mutex<vt100::Parser>>,
-    /// All that the program has sent.
+    /// Everything the program has sent.
     bytes: Arc<Mutex<Vec<u8>>>,
     relay: Option<Relay>,
     is_reading: Arc<AtomicBool>,
@@ -194,8 +194,8 @@ impl Terminal {
                 std::thread::spawn(move || {
                     let mut bytes = [0; 1 << 16];
                     while let Ok(count @ 1..) = output.read(&mut bytes) {
-                        kept.lock().expect("a list does not panic").extend_from_slice(&bytes[..count]);
-                        shared.lock().expect("a parser does not panic").process(&bytes[..count]);
+                        kept.lock().expect("not poisoned").extend_from_slice(&bytes[..count]);
+                        shared.lock().expect("not poisoned").process(&bytes[..count]);
                         while !reads.load(Ordering::Acquire) {
                             std::thread::sleep(Duration::from_millis(5));
                         }
@@ -207,7 +207,7 @@ impl Terminal {
         Self { master: pair.master, _slave: pair.slave, child, keys, screen, bytes, relay, is_reading }
     }
 
-    /// The value of `look` once it stays the same: words come before the picture.
+    /// The value of `look` once it is stable: text appears before the image.
     pub fn settled<T: PartialEq>(&self, look: impl Fn(&vt100::Screen) -> T) -> T {
         let mut before = self.look(&look);
         loop {
@@ -225,28 +225,28 @@ impl Terminal {
             relay.press(keys);
             return;
         }
-        let mut writer = self.keys.lock().expect("a writer does not panic");
+        let mut writer = self.keys.lock().expect("not poisoned");
         writer.write_all(keys.as_bytes()).expect("keys are taken");
     }
 
-    /// Types more than the terminal holds, and waits until the program has read it.
+    /// Types more than the terminal buffers, and waits until the program has read it.
     pub fn burst(&mut self, keys: String) {
         let writer = self.keys.clone();
         std::thread::spawn(move || {
-            // A program that ends reads no more.
-            let _ = writer.lock().expect("a writer does not panic").write_all(keys.as_bytes());
+            // A program that has ended reads no more.
+            let _ = writer.lock().expect("not poisoned").write_all(keys.as_bytes());
         });
     }
 
     pub fn resize(&mut self, columns: u16, rows: u16) {
-        let mut screen = self.screen.lock().expect("a parser does not panic");
+        let mut screen = self.screen.lock().expect("not poisoned");
         screen.screen_mut().set_size(side(rows), side(columns));
         self.master.resize(size(columns, rows)).expect("resized");
     }
 
-    /// Writes on the terminal as another program would.
+    /// Writes to the screen as another program would.
     pub fn scribble(&self, bytes: &str) {
-        self.screen.lock().expect("a parser does not panic").process(bytes.as_bytes());
+        self.screen.lock().expect("not poisoned").process(bytes.as_bytes());
     }
 
     pub fn signal(&self, signal: Signal) {
@@ -263,7 +263,7 @@ impl Terminal {
         self.is_reading.store(reading, Ordering::Release);
     }
 
-    /// Waits for the end of the program.
+    /// Waits for the program to end.
     #[track_caller]
     pub fn code(&mut self) -> u32 {
         let deadline = Instant::now() + LIMIT;
@@ -271,20 +271,20 @@ impl Terminal {
             if let Some(status) = self.child.try_wait().expect("a child") {
                 return status.exit_code();
             }
-            assert!(Instant::now() < deadline, "it does not end\n{}", self.text());
+            assert!(Instant::now() < deadline, "the program does not end\n{}", self.text());
             std::thread::sleep(Duration::from_millis(5));
         }
     }
 
-    /// Lines that a program which has ended left on the screen.
+    /// The lines that a program has left on the screen after it ended.
     pub fn last_lines(&self) -> String {
-        self.wait("the screen from before", |screen| {
+        self.wait("the restored screen", |screen| {
             !screen.alternate_screen() && !screen.contents().trim().is_empty()
         });
         self.settled(|screen| screen.contents().trim().to_owned())
     }
 
-    /// Traffic of the thin line.
+    /// Traffic of the slow connection.
     pub fn line<T>(&self, what: impl FnOnce(&Seen) -> T) -> T {
         let relay = self.relay.as_ref().expect("a thin line");
         what(&relay.seen.lock().expect("no panic"))
@@ -292,7 +292,7 @@ impl Terminal {
 
     /// All bytes so far.
     pub fn bytes(&self) -> Vec<u8> {
-        self.bytes.lock().expect("a list does not panic").clone()
+        self.bytes.lock().expect("not poisoned").clone()
     }
 
     /// Text of the screen.
@@ -301,7 +301,7 @@ impl Terminal {
     }
 
     pub fn look<T>(&self, what: impl FnOnce(&vt100::Screen) -> T) -> T {
-        what(self.screen.lock().expect("a parser does not panic").screen())
+        what(self.screen.lock().expect("not poisoned").screen())
     }
 
     /// Waits until the screen satisfies `holds`.
@@ -331,13 +331,13 @@ impl Terminal {
         });
     }
 
-    /// Waits until this many renders are finished and no other is under way.
+    /// Waits until this many renders are finished and none is running.
     #[track_caller]
     pub fn wait_for_render(&self, number: usize) {
         let words = format!("· run {number}");
         self.wait(&words, |screen| {
             let text = screen.contents();
-            // Frames arrive in pieces, from the top: the bar below the picture is gone when all words are there.
+            // Frames arrive in pieces, from the top: once the bar below the image is gone, all text is there.
             let is_whole = !text.contains(" samples · ");
             let is_over = |line: &str| line.contains("✓ done") || line.contains("! unwritten");
             let is_done = |line: &str| is_over(line) && line.trim_end().ends_with(&words);
@@ -345,7 +345,7 @@ impl Terminal {
         });
     }
 
-    /// Waits for the picture to be of this color.
+    /// Waits for the image to have this color.
     #[track_caller]
     pub fn wait_for_color(&self, name: &str) {
         self.wait(name, |screen| {
@@ -354,17 +354,17 @@ impl Terminal {
         });
     }
 
-    /// Waits for the end; checks that the terminal is as it was before and returns the exit code.
+    /// Waits for the end, checks that the terminal is restored, and returns the exit code.
     #[track_caller]
     pub fn end(self) -> u32 {
         self.end_saying("")
     }
 
-    /// [`Terminal::end`], with one of these words, separated by `|`, on the final screen.
+    /// [`Terminal::end`], waiting until the final screen contains one of these texts, separated by `|`.
     #[track_caller]
     pub fn end_saying(mut self, words: &str) -> u32 {
         let code = self.code();
-        self.wait("the screen from before, with a cursor", |screen| {
+        self.wait("the restored screen with a cursor", |screen| {
             !screen.alternate_screen() && !screen.hide_cursor() && !screen.bracketed_paste()
         });
         let modes = self.master.get_termios().expect("modes").local_flags.bits();
@@ -380,7 +380,7 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // Where a test failed the program is still there; else it is gone already.
+        // If a test failed, the program may still run; otherwise it has ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -394,7 +394,7 @@ fn side(length: u16) -> NonZeroU16 {
     NonZeroU16::new(length).expect("not zero")
 }
 
-/// Cells by the channel that is far above the others.
+/// Cells counted by the channel that clearly dominates.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Colors {
     pub red: usize,
@@ -408,7 +408,7 @@ impl Colors {
         let mut colors = Self::default();
         for color in cells(screen).filter_map(upper) {
             let vt100::Color::Rgb(r, g, b) = color else { continue };
-            // Compare far from the colors of edges: the last bits of a color depend on the cell's history.
+            // Compare far from edge colors: the last bits of a color depend on the cell's history.
             let above = |a: u8, b: u8, c: u8| a > 50 && a / 2 > b.max(c);
             colors.red += usize::from(above(r, g, b));
             colors.green += usize::from(above(g, r, b));
@@ -425,7 +425,7 @@ impl Colors {
         self.most() == Some(name)
     }
 
-    /// The color of nearly all of them, if they are enough for a picture.
+    /// The color of nearly all cells, if there are enough for an image.
     fn most(&self) -> Option<&'static str> {
         let total = self.total();
         let all = [(self.red, "red"), (self.green, "green"), (self.blue, "blue")];

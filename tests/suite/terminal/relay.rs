@@ -1,7 +1,7 @@
-//! The program at the end of a thin line: 1 Mbit/s, 150 ms there and back, buffers that take 2 MB (ssh's window).
+//! A slow connection: 1 Mbit/s, a round trip of 150 ms, and buffers of 2 MB (the window of ssh).
 //!
-//! A relay lies between the pseudo-terminal and the person's screen. It answers as a terminal does, or as tmux does
-//! (at once, in the terminal's place), or not at all.
+//! A relay between the pseudo-terminal and the user's screen replies to queries as a terminal does, or as tmux does
+//! (immediately, on behalf of the terminal), or not at all.
 
 use std::collections::VecDeque;
 use std::io::{Read, Write};
@@ -10,14 +10,14 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Bytes a second: 1 Mbit/s.
+/// Bytes per second: 1 Mbit/s.
 const RATE: f64 = 125_000.0;
 /// Delay in one direction.
 const DELAY: Duration = Duration::from_millis(75);
 const QUESTIONS: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
-/// Source of the answers to the program's queries.
+/// Who replies to the program's queries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
     /// The terminal, at the far end.
@@ -27,22 +27,22 @@ pub enum Answers {
     Nothing,
 }
 
-/// Traffic on the line.
+/// Traffic on the connection.
 #[derive(Debug, Default)]
 pub struct Seen {
-    /// Bytes that came out of the program.
+    /// Bytes that the program has sent.
     pub sent: usize,
-    /// Bytes that are on the person's screen.
+    /// Bytes on the user's screen.
     pub shown: usize,
-    /// Bytes up to the last query whose answer has arrived at the program.
+    /// Bytes before the last query whose reply has reached the program.
     answered: usize,
-    /// Most bytes without an answer.
+    /// Largest number of unacknowledged bytes.
     pub most_unanswered: usize,
-    /// Most bytes that were in the line.
+    /// Largest number of queued bytes.
     pub most_waiting: usize,
 }
 
-/// Bytes on their way, with the time of their arrival; for an answer, with the number of bytes before its query.
+/// Bytes in transit with the time of their arrival; for a reply, also the number of bytes before its query.
 struct Due {
     when: Instant,
     bytes: Vec<u8>,
@@ -55,14 +55,14 @@ impl Due {
     }
 }
 
-/// The two directions of a line.
+/// The two directions of a connection.
 pub struct Relay {
     pub seen: Arc<Mutex<Seen>>,
     up: Sender<Due>,
 }
 
 impl Relay {
-    /// Starts a relay between the program's output, its input, and the person's screen.
+    /// Starts a relay between the program's output, its input, and the user's screen.
     pub fn start(
         mut output: Box<dyn Read + Send>,
         input: Arc<Mutex<Box<dyn Write + Send>>>,
@@ -87,7 +87,7 @@ impl Relay {
                         let _ = to_answer.send(Due::answer(answer, now));
                     }
                 }
-                // The line is a clock: later bytes wait for earlier ones.
+                // Bytes arrive in order: later ones wait for earlier ones.
                 for part in bytes.chunks(250) {
                     free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / RATE);
                     let _ = down.send(Due { when: free + DELAY, bytes: part.to_vec(), asked: None });
@@ -101,7 +101,7 @@ impl Relay {
         Self { seen, up }
     }
 
-    /// Presses keys as the person.
+    /// Types keys as the user.
     pub fn press(&self, keys: &str) {
         let when = Instant::now() + DELAY;
         let _ = self.up.send(Due { when, bytes: keys.as_bytes().to_vec(), asked: None });
@@ -135,7 +135,7 @@ fn show(
     }
 }
 
-/// Delivers keys and answers, each when it is due.
+/// Delivers keys and replies when they are due.
 fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mutex<Seen>) {
     let mut waiting: VecDeque<Due> = VecDeque::new();
     loop {
@@ -163,7 +163,7 @@ fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mu
     }
 }
 
-/// Finds queries in a stream that may be cut anywhere.
+/// Finds queries in a stream that may be split anywhere.
 #[derive(Default)]
 struct Scanner {
     last: Vec<u8>,
@@ -172,7 +172,7 @@ struct Scanner {
 }
 
 impl Scanner {
-    /// The answers, each with the number of bytes up to its query.
+    /// The replies, each with the number of bytes before its query.
     fn answers(&mut self, bytes: &[u8]) -> Vec<(&'static [u8], usize)> {
         let mut found = Vec::new();
         for byte in bytes {

@@ -1,4 +1,4 @@
-//! Ways of saving a file: each gives one render, and no error on the way.
+//! Ways of saving a file: each triggers one render and no error in between.
 
 use std::fs;
 use std::io::Write;
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::pty::{BLUE, Folder, GREEN, RED, SCENE, Terminal};
 
-/// A way of saving: the file gets this text.
+/// A way of saving a text to a file.
 type Save = fn(&Path, &str);
 
 const WAYS: [(&str, Save); 6] = [
@@ -34,8 +34,8 @@ const WAYS: [(&str, Save); 6] = [
         fs::write(path, text).expect("written");
     }),
     ("the target of a link is replaced", |path, text| {
-        // The first time it becomes a link, which changes nothing that it holds: what is beyond is then found without
-        // a hint.
+        // The first save turns the file into a link with the same content; the watcher then has to find the target on
+        // its own.
         let folder = beside(path, ".d");
         if !folder.is_dir() {
             fs::create_dir(&folder).expect("a folder");
@@ -53,7 +53,7 @@ fn beside(path: &Path, ending: &str) -> std::path::PathBuf {
     name.into()
 }
 
-/// Two colors in turns, by which one can see which save is shown.
+/// Two alternating colors that identify the saved version.
 fn shades() -> impl Iterator<Item = (&'static str, &'static str)> {
     [("green", GREEN), ("blue", BLUE)].into_iter().cycle()
 }
@@ -68,7 +68,7 @@ fn every_way_of_saving_a_scene_renders_once() {
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             terminal.wait_for_color(color);
             terminal.wait_for_render(render);
-            // Saving the same once more is no reason to render: the count of the next round shows it.
+            // Saving the same content again triggers no render, as the next round's count shows.
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             println!("{way} {options:?}");
         }
@@ -96,7 +96,7 @@ fn every_way_of_saving_an_asset_renders_once() {
     }
 }
 
-/// No error is on the screen until a render of this color is.
+/// Checks that no error appears until a render with this color finishes.
 #[track_caller]
 fn no_error_until(terminal: &Terminal, color: &'static str, render: usize) {
     terminal.wait(color, |screen| {
@@ -112,11 +112,11 @@ fn halves(text: &str) -> (&str, &str) {
     text.split_at(text.find("diffuse").expect("a material") + 4)
 }
 
-/// Pause of the writer. If the machine makes it longer than required, the test proves nothing.
+/// Pause of the writer. If the machine stretches it too far, the test proves nothing.
 const PAUSE: Duration = Duration::from_millis(200);
 
 #[test]
-fn a_slow_writer_shows_no_error_in_between() {
+fn slow_save_shows_no_error() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -150,14 +150,14 @@ fn a_slow_writer_shows_no_error_in_between() {
 }
 
 #[test]
-fn an_error_that_stays_is_shown() {
+fn persistent_error_is_shown() {
     let folder = Folder::new();
     let terminal = folder.terminal();
     terminal.wait_for_render(1);
     let (half, _) = halves(SCENE);
     let mut file = fs::File::create(folder.path("scene.toml")).expect("opened");
     file.write_all(half.as_bytes()).expect("written");
-    // Held open: shown all the same in the end.
+    // A file held open is reported as well in the end.
     terminal.wait_for("broken");
     drop(file);
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));
@@ -167,7 +167,7 @@ fn an_error_that_stays_is_shown() {
 }
 
 #[test]
-fn a_file_that_breaks_does_not_stop_the_render_of_the_last_good_scene() {
+fn broken_save_does_not_stop_the_render() {
     let folder = Folder::new();
     // Long enough for a save.
     let slow = SCENE.replace("samples = 4", "samples = 1000").replace("width = 64", "width = 320");
@@ -186,9 +186,9 @@ fn a_file_that_breaks_does_not_stop_the_render_of_the_last_good_scene() {
     assert_eq!(written, folder.once(&[]));
 }
 
-/// Removes the scene's folder and makes it again, as a checkout does: seen from inside it and from outside.
+/// Removes and recreates the scene's folder, as a checkout does; the program runs inside it or outside.
 #[test]
-fn a_folder_that_goes_and_comes_back_is_found_again() {
+fn recreated_folder_is_watched() {
     for (line, picture) in [
         ("cd work && exec \"$0\" scene.toml", "work/scene.png"),
         ("exec \"$0\" work/scene.toml", "scene.png"),
@@ -211,11 +211,11 @@ fn a_folder_that_goes_and_comes_back_is_found_again() {
         terminal.wait_for_color("blue");
         terminal.wait_for_render(2);
         assert!(folder.path(picture).is_file(), "{picture}");
-        // From now on as before.
+        // From now on, saves work as before.
         folder.write("work/scene.toml", &SCENE.replace(RED, GREEN));
         terminal.wait_for_color("green");
         terminal.wait_for_render(3);
-        // Gone and back before anybody looks.
+        // The folder disappears and returns between two polls.
         fs::remove_dir_all(folder.path("work")).expect("removed");
         make(GREEN);
         folder.write("work/scene.toml", SCENE);

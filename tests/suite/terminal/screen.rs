@@ -1,4 +1,4 @@
-//! The whole screen in windows of all sizes: the picture alone, the help, the list of views, the end.
+//! The whole screen in windows of all sizes: only the preview, the help, the view list, quitting.
 
 use super::pty::{Colors, Folder, SCENE, Terminal};
 
@@ -12,7 +12,7 @@ fn last_line(screen: &vt100::Screen) -> String {
     screen.contents().lines().nth(rows - 1).unwrap_or_default().trim_end().to_owned()
 }
 
-/// Waits until the words for this size are there, and returns the red cells once they stay.
+/// Waits until the text for this size appears, and returns the number of red cells once it is stable.
 fn resized(terminal: &mut Terminal, columns: u16, rows: u16) -> usize {
     terminal.resize(columns, rows);
     terminal.wait("the line of keys", |screen| last_line(screen).ends_with("? help"));
@@ -20,7 +20,7 @@ fn resized(terminal: &mut Terminal, columns: u16, rows: u16) -> usize {
 }
 
 #[test]
-fn tab_leaves_the_picture_alone_and_comes_back() {
+fn tab_shows_only_the_preview() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -40,7 +40,7 @@ fn tab_leaves_the_picture_alone_and_comes_back() {
 }
 
 #[test]
-fn the_help_scrolls_where_it_does_not_fit() {
+fn help_scrolls_in_small_windows() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -61,7 +61,7 @@ fn the_help_scrolls_where_it_does_not_fit() {
 }
 
 #[test]
-fn a_view_is_chosen_from_the_list() {
+fn digits_choose_from_the_view_list() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -75,13 +75,13 @@ fn a_view_is_chosen_from_the_list() {
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.press("V");
     terminal.wait_for("▸5 uv");
-    // It goes by itself.
+    // The list closes after a while.
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.wait_for("v uv");
 }
 
 #[test]
-fn small_windows_show_picture_state_errors_and_keys() {
+fn small_windows_show_preview_errors_and_keys() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -103,7 +103,7 @@ fn small_windows_show_picture_state_errors_and_keys() {
 }
 
 #[test]
-fn without_colours_every_state_has_its_sign_and_word() {
+fn every_state_has_a_sign_and_a_word() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("NO_COLOR", "1")]);
     terminal.wait_for("✓ done");
@@ -120,7 +120,7 @@ fn without_colours_every_state_has_its_sign_and_word() {
 }
 
 #[test]
-fn a_storm_of_sizes_leaves_the_screen_of_the_last_one() {
+fn last_of_many_resizes_wins() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -137,14 +137,14 @@ fn a_storm_of_sizes_leaves_the_screen_of_the_last_one() {
     terminal.resize(80, 24);
     terminal.wait("the last line", |screen| last_line(screen).ends_with("? help"));
     terminal.wait("the picture", |screen| Colors::of(screen).red == red);
-    // Right after an escape character it would be alt-q.
+    // Immediately after an escape character, the key would be Alt-q.
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }
 
 #[test]
-fn one_line_stays_when_it_is_left() {
+fn quit_leaves_one_line() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -153,7 +153,7 @@ fn one_line_stays_when_it_is_left() {
 }
 
 #[test]
-fn a_terminal_of_256_colours_gets_no_others() {
+fn terminal_of_256_colors_gets_no_others() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &[("COLORTERM", "")]);
     terminal.wait_for_render(1);

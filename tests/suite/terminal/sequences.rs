@@ -1,4 +1,5 @@
-//! Random keys, saves and ends: until `w`, the image on disk is that of the scene as saved, and the line after `q` is true.
+//! Random keys, saves and endings: until `w`, the image on disk belongs to a saved scene, and the line after `q` is
+//! true.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,13 +11,13 @@ use nix::sys::signal::Signal;
 use super::pty::{Folder, SCENE, Terminal};
 use crate::test_dir::PROGRAM;
 
-/// Sequences of the daily test.
+/// Number of sequences in the regular test.
 const SEQUENCES: u64 = 12;
-/// Sequences of the long one, over all its scenes.
+/// Number of sequences in the long test, over all its scenes.
 const LONG: u64 = 300;
-/// Bundled scenes of the long one.
+/// Bundled scenes of the long test.
 const BUNDLED: [&str; 6] = ["dof", "path", "phong", "photons", "shadows", "textures"];
-/// Keys that show something else.
+/// Keys that change only the preview.
 const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
 
 /// Random numbers.
@@ -28,19 +29,19 @@ impl Dice {
     }
 }
 
-/// A scene in a folder, the program at work on it, and what has been done so far.
-struct Run<'a> {
+/// A scene in a folder, the program rendering it, and the actions so far.
+struct RandomSession<'a> {
     folder: Folder,
     terminal: Terminal,
     options: &'a [&'a str],
-    /// Texts that the scene file has had.
+    /// All versions of the scene file.
     saved: Vec<String>,
     /// Whether `w` was pressed.
     has_written: bool,
     log: Vec<String>,
 }
 
-impl<'a> Run<'a> {
+impl<'a> RandomSession<'a> {
     fn new(text: &str, options: &'a [&'a str]) -> Self {
         let folder = Folder::new();
         folder.write("scene.toml", text);
@@ -90,7 +91,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The image that a headless run makes of a text.
+    /// The image that a headless run renders from a text.
     fn once(&self, known: &mut HashMap<String, Vec<u8>>, text: &str, options: &[&str]) -> Vec<u8> {
         let key = format!("{text}\0{options:?}");
         let image = known.entry(key).or_insert_with(|| {
@@ -105,7 +106,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// The pixels of a PNG: its settings name the scene's file.
+/// The pixels of a PNG, without its settings, which name the scene file.
 fn without_settings(path: &Path) -> Vec<u8> {
     let file = std::io::BufReader::new(std::fs::File::open(path).expect("an image"));
     let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
@@ -114,48 +115,48 @@ fn without_settings(path: &Path) -> Vec<u8> {
     pixels
 }
 
-/// Ends of a sequence.
+/// How a sequence ends.
 #[derive(Clone, Copy, Debug)]
-enum End {
+enum SequenceEnd {
     Quit,
     Signal(Signal),
 }
 
 fn run(seed: u64, text: &str, options: &[&str], known: &mut HashMap<String, Vec<u8>>) {
     let mut dice = Dice(Box::new(glimt::math::random::unit(seed)));
-    let mut run = Run::new(text, options);
+    let mut run = RandomSession::new(text, options);
     run.terminal.wait("the screen", |screen| screen.contents().contains("scene.toml"));
     for _ in 0..3 + dice.below(8) {
         run.step(&mut dice);
     }
-    let ends = [Signal::SIGTERM, Signal::SIGHUP, Signal::SIGKILL].map(End::Signal);
-    let end = if dice.below(3) > 0 { End::Quit } else { ends[dice.below(ends.len())] };
+    let ends = [Signal::SIGTERM, Signal::SIGHUP, Signal::SIGKILL].map(SequenceEnd::Signal);
+    let end = if dice.below(3) > 0 { SequenceEnd::Quit } else { ends[dice.below(ends.len())] };
     match end {
-        End::Quit => run.terminal.press("q"),
-        End::Signal(signal) => run.terminal.signal(signal),
+        SequenceEnd::Quit => run.terminal.press("q"),
+        SequenceEnd::Signal(signal) => run.terminal.signal(signal),
     }
     run.terminal.code();
     let said = match end {
-        End::Quit => run.terminal.last_lines(),
-        End::Signal(_) => String::new(),
+        SequenceEnd::Quit => run.terminal.last_lines(),
+        SequenceEnd::Signal(_) => String::new(),
     };
     run.log.push(format!("{end:?}: {said}"));
     check(&run, &said, known, seed);
 }
 
-/// Holds the image on disk and the last lines against the scene as it was saved.
-fn check(run: &Run<'_>, said: &str, known: &mut HashMap<String, Vec<u8>>, seed: u64) {
+/// Checks the image on disk and the last lines against the saved scenes.
+fn check(run: &RandomSession<'_>, said: &str, known: &mut HashMap<String, Vec<u8>>, seed: u64) {
     let log = format!("seed {seed}: {}", run.log.join(", "));
     let path = run.folder.path("scene.png");
     let image = path.exists().then(|| without_settings(&path));
     let now = run.saved.last().expect("a scene").clone();
     let newest = run.once(known, &now, &[]);
-    // The scene may have been saved too late for this run.
+    // The last save may have been too late for this run.
     let is_current = image.as_ref() == Some(&newest);
     if !run.has_written {
         let earlier = run.saved.clone();
         let is_one = |image: &Vec<u8>| earlier.iter().any(|text| run.once(known, text, &[]) == *image);
-        assert!(image.as_ref().is_none_or(is_one), "no saved scene makes this image: {log}");
+        assert!(image.as_ref().is_none_or(is_one), "no saved scene gives this image: {log}");
     }
     if said.is_empty() {
         return;
@@ -163,18 +164,18 @@ fn check(run: &Run<'_>, said: &str, known: &mut HashMap<String, Vec<u8>>, seed: 
     let first = said.lines().next().unwrap_or_default();
     let is_older = ["older than", "not finished", "was stopped", "no image written", "is not written"];
     if is_older.iter().any(|words| first.contains(words)) {
-        // A save of a comment makes the file older without making another image.
+        // Saving a comment makes the file older without changing the image.
         let before = run.saved.iter().rev().skip(1);
         let was_made_before = before.clone().any(|text| run.once(known, text, &[]) == newest);
         let is_true = run.has_written || !is_current || was_made_before || first.contains("was stopped");
-        assert!(is_true, "it is the newest one: {log}");
+        assert!(is_true, "the image is up to date: {log}");
     } else if first.starts_with("wrote ")
         && first.contains("samples")
         && !first.contains(", with ")
         && !first.contains("view ")
     {
         let was_seen = run.saved.iter().rev().take(2).any(|text| image == Some(run.once(known, text, &[])));
-        assert!(is_current || was_seen, "it is of another scene: {log}");
+        assert!(is_current || was_seen, "the image belongs to another scene: {log}");
     }
     if let Some(options) = said.lines().find_map(|line| line.strip_prefix("not kept: ")) {
         let options: Vec<String> = options.split(' ').map(|word| word.replace('\'', "")).collect();
@@ -184,7 +185,7 @@ fn check(run: &Run<'_>, said: &str, known: &mut HashMap<String, Vec<u8>>, seed: 
 }
 
 #[test]
-fn the_image_is_that_of_the_saved_scene_and_the_last_line_is_true() {
+fn random_keys_never_write_another_scene() {
     let mut known = HashMap::new();
     for seed in 0..SEQUENCES {
         run(seed, SCENE, &["--samples", "64"], &mut known);
@@ -206,7 +207,7 @@ fn sequences_over_bundled_scenes() {
 }
 
 #[test]
-fn looking_leaves_a_finished_image_alone() {
+fn preview_keys_keep_the_finished_image() {
     let folder = Folder::new();
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
     terminal.wait_for_render(1);
@@ -226,7 +227,7 @@ fn looking_leaves_a_finished_image_alone() {
 }
 
 #[test]
-fn an_interrupted_image_continues_in_the_next_call() {
+fn interrupted_image_resumes_in_the_next_run() {
     let folder = Folder::new();
     let whole = {
         folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 3000"));
@@ -249,7 +250,7 @@ fn an_interrupted_image_continues_in_the_next_call() {
 }
 
 #[test]
-fn an_image_that_another_program_changed_is_reported() {
+fn foreign_change_of_the_image_is_reported() {
     let folder = Folder::new();
     let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
     terminal.wait_for_render(1);
@@ -260,7 +261,7 @@ fn an_image_that_another_program_changed_is_reported() {
     terminal.wait_for("wrote scene.png");
     assert_eq!(folder.bytes("scene.png"), image);
     terminal.wait("it is there", |screen| !screen.contents().contains("was removed"));
-    // Another glimt, with other settings.
+    // Another glimt writes with other settings.
     let other = folder.once(&["--shadows", "off", "-o", "other.png"]);
     drop(other);
     std::fs::rename(folder.path("other.png"), folder.path("scene.png")).expect("moved");

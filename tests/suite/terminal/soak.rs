@@ -1,9 +1,9 @@
-//! A soak: edits, keys, resizes, broken scenes, dropped terminals for as long as one likes, at random with a fixed seed.
+//! Soak test: random edits, keys, resizes, broken scenes and dropped terminals, from a fixed seed, for any duration.
 //!
 //!     GLIMT_SOAK_MINUTES=60 cargo test --profile quick --test suite soak -- --ignored --nocapture
 //!
-//! One program lives from the start to the end. Beside it, in a folder of its own, others are ended in every way and called again,
-//! with a checkpoint. `GLIMT_SOAK_SEED` chooses other events.
+//! One program runs from start to end. In a separate folder, others are ended in every way and started again, with a
+//! checkpoint. `GLIMT_SOAK_SEED` selects other events.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,11 +13,11 @@ use nix::sys::signal::Signal;
 
 use super::pty::{Folder, Terminal};
 
-/// Time between two looks at the program.
+/// Interval between checks of the program.
 const PAUSE: Duration = Duration::from_secs(20);
-/// Longest time for an image.
+/// Time limit for an image.
 const LIMIT: Duration = Duration::from_secs(300);
-/// Growth of the memory from the middle to the end that is not a leak, in KiB.
+/// Memory growth from the middle to the end that does not count as a leak, in KiB.
 const SLACK: u64 = 16 << 10;
 
 /// Random numbers.
@@ -38,7 +38,7 @@ impl Dice {
     }
 }
 
-/// A scene that shows a mesh and a texture.
+/// A scene with a mesh and a texture.
 fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
     let (width, height) = (32 + dice.below(48), 24 + dice.below(32));
     let photons = dice.of(&["", "", "[photons]\nenabled = true\ncount = 2000\n"]);
@@ -57,7 +57,7 @@ fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
     )
 }
 
-/// Writes a file as one of many editors does.
+/// Writes a file in the manner of a random editor.
 fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
     let new = folder.path("new~");
     match dice.below(4) {
@@ -67,7 +67,7 @@ fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
             fs::rename(&new, folder.path(name)).expect("renamed");
         }
         2 => {
-            // Without the file for a moment.
+            // Leave the file missing for a moment.
             let _ = fs::remove_file(folder.path(name));
             fs::write(&new, text).expect("written");
             fs::rename(&new, folder.path(name)).expect("renamed");
@@ -81,7 +81,7 @@ fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
     }
 }
 
-/// Writes the mesh and the texture, each a little other than before.
+/// Writes the mesh and the texture with small changes.
 fn save_assets(folder: &Folder, dice: &mut Dice) {
     let top = 0.5 + dice.below(8) as f32 / 10.0;
     let grey = 100 + dice.below(100);
@@ -90,7 +90,7 @@ fn save_assets(folder: &Folder, dice: &mut Dice) {
     save(folder, dice, "tiles.ppm", &tiles);
 }
 
-/// Figures of a process.
+/// Metrics of a process.
 #[derive(Clone, Copy, Debug)]
 struct Figures {
     minutes: f32,
@@ -127,14 +127,15 @@ impl Figures {
     }
 }
 
-/// Saves a last scene, and waits until its image is that of `--once`.
+/// Saves a last scene, and waits until its image equals the one of `--once`.
 fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &[&str]) {
     folder.write("scene.toml", text);
     let once = folder.once(options);
     let (begin, mut next) = (Instant::now(), Instant::now());
     while fs::read(folder.path("scene.png")).ok().as_ref() != Some(&once) {
         assert!(begin.elapsed() < LIMIT, "not the image of --once\n{text}\n{}", terminal.text());
-        // Close what is open, go back to the scene's settings. On a busy machine both keys may arrive as one, which is another key.
+        // Close any overlay and return to the scene's settings. On a busy machine, both keys may arrive together as a
+        // different key.
         if Instant::now() >= next {
             terminal.press("\x1b");
             std::thread::sleep(Duration::from_millis(400));
@@ -145,14 +146,14 @@ fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &
     }
 }
 
-/// Keys that change the picture, the screen or nothing. Not those that end the program, start an editor or change the file.
+/// Keys that change the preview, the screen or nothing. Excludes keys that quit, start an editor or change the file.
 const KEYS: [&str; 34] = [
     "s", "d", "p", "i", "v", "V", "\t", "x", "z", "h", "j", "k", "l", "+", "-", "<", ">", "[", "]", "f",
     "\r", "m", "b", "n", "N", " ", "r", "w", "0", "e", "?", "\x1b", "3", "\x1b[A",
 ];
 
 #[test]
-#[ignore = "takes as long as one likes"]
+#[ignore = "runs for GLIMT_SOAK_MINUTES"]
 fn soak() {
     let number =
         |name: &str, default: u64| std::env::var(name).map_or(default, |text| text.parse().expect(name));
@@ -196,7 +197,7 @@ fn soak() {
             }
             10 => lives.resize(20 + dice.below(140) as u16, 6 + dice.below(50) as u16),
             11 => {
-                // A line that hangs.
+                // Drop the connection.
                 lives.set_reading(false);
                 std::thread::sleep(Duration::from_millis(300));
                 lives.set_reading(true);
@@ -226,7 +227,7 @@ fn soak() {
         if Instant::now() < next {
             continue;
         }
-        // The images of both, then the figures of the one that lives.
+        // Check the images of both programs, then the metrics of the one that keeps running.
         let text = scene(&mut dice, 8, events);
         assert_image(&mut lives, own, &text, &[]);
         let text = scene(&mut dice, 64, events % 5);
@@ -238,7 +239,7 @@ fn soak() {
         }
         next = Instant::now() + PAUSE;
     }
-    // How it all was.
+    // Print a summary.
     assert!(figures.len() >= 3, "some minutes, please");
     let (first, middle, last) = (figures[0], figures[figures.len() / 2], figures[figures.len() - 1]);
     eprintln!("{events} events, {images} images as by --once; ended as (signal, code): {ends:?}");
@@ -246,7 +247,7 @@ fn soak() {
         eprintln!("{}", figures.words(when));
     }
     let most = figures.iter().map(|figures| figures.memory_kib).max().unwrap_or_default();
-    eprintln!("most memory at a look: {:.1} MiB", most as f32 / 1024.0);
+    eprintln!("peak of the samples: {:.1} MiB", most as f32 / 1024.0);
     lives.press("q");
     assert_eq!(lives.code(), 0);
     drop(falls);

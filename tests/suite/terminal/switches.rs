@@ -1,10 +1,10 @@
-//! Photons, integrator and views by their keys: on the screen, in the file and in the report.
+//! Keys for photons, integrator and views: on the screen, in the file and in the report.
 
 use std::fs;
 
 use super::pty::{Folder, SCENE, Terminal};
 
-/// A ball of glass before the board, through which photons come.
+/// A glass ball in front of the board, so that photons are emitted.
 fn glassy() -> String {
     let ball = "ball = { type = \"glass\" }";
     SCENE.replace("ball = { diffuse = [0.02, 0.02, 0.02] }", ball) + "[photons]\ncount = 2000\n"
@@ -16,7 +16,7 @@ fn setting(folder: &Folder, name: &str) -> serde_json::Value {
 }
 
 #[test]
-fn photons_and_the_integrator_are_switched_for_this_run() {
+fn photons_and_integrator_switch_for_this_run() {
     let folder = Folder::new();
     folder.write("scene.toml", &glassy());
     let call = [folder.program(), "scene.toml", "--report", "report.json"];
@@ -51,7 +51,7 @@ fn photons_and_the_integrator_are_switched_for_this_run() {
 }
 
 #[test]
-fn what_path_does_not_know_is_said() {
+fn keys_ignored_by_path_are_explained() {
     let folder = Folder::new();
     folder.write("scene.toml", &glassy());
     let mut terminal = folder.terminal();
@@ -66,7 +66,7 @@ fn what_path_does_not_know_is_said() {
     terminal.wait_for_render(2);
 }
 
-/// Waits for a view in the line of keys.
+/// Waits for a view in the key line.
 fn wait_for_view(terminal: &Terminal, name: &str) {
     terminal.wait(name, |screen| {
         let text = screen.contents();
@@ -75,17 +75,17 @@ fn wait_for_view(terminal: &Terminal, name: &str) {
 }
 
 #[test]
-fn each_digit_chooses_its_view_while_the_list_is_open() {
+fn digits_choose_views_in_the_open_list() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let views =
         ["beauty", "normal", "depth", "barycentric", "uv", "albedo", "ambient", "diffuse", "specular"];
     for (digit, view) in (1..).zip(views) {
-        // Together, so that the list is not gone by itself in between.
+        // Press both together, so that the list does not close in between.
         terminal.press(&format!("v{digit}"));
         terminal.wait_for(&format!("▸{digit} {view}"));
-        // Closes the list, which covers the line of keys.
+        // Close the list, which covers the key line.
         terminal.press("\r");
         wait_for_view(&terminal, view);
     }
@@ -103,13 +103,13 @@ fn each_digit_chooses_its_view_while_the_list_is_open() {
 }
 
 #[test]
-fn the_previous_view_of_the_first_is_the_last() {
+fn views_wrap_around() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("V");
     wait_for_view(&terminal, "error");
-    // The list is closed.
+    // Close the list.
     terminal.press("\r");
     terminal.wait_for_render(2);
     terminal.press("v");
@@ -117,7 +117,7 @@ fn the_previous_view_of_the_first_is_the_last() {
 }
 
 #[test]
-fn render_again_takes_every_sample_anew() {
+fn render_again_retraces_every_sample() {
     let folder = Folder::new();
     let call = [folder.program(), "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);

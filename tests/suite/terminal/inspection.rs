@@ -1,17 +1,17 @@
-//! Inspecting a place of the picture: by a click, and at the crosshair by keys alone.
+//! Inspecting a point of the image with a click, and at the crosshair with keys.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-use super::hands::EDITOR;
+use super::mouse_and_editor::EDITOR;
 use super::pty::{Colors, Folder, SCENE, Terminal};
 
-/// A click on a cell from 1.
+/// A click on a cell, counted from 1.
 fn click(column: u16, row: u16) -> String {
     format!("\x1b[<0;{column};{row}M\x1b[<0;{column};{row}m")
 }
 
-/// The scene with its ball, which has a name, before the middle of the board.
+/// The scene with a named ball in front of the middle of the board.
 fn centred() -> String {
     SCENE.replace("center = [0.5, 0.2, 0.8]", "name = \"apple\"\ncenter = [0, 0, 0.8]")
 }
@@ -25,7 +25,7 @@ fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal
     folder.write("scene.toml", text);
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], variables);
     terminal.wait_for_render(1);
-    // Room for one fact a line.
+    // Make room for one fact per line.
     terminal.resize(120, 40);
     terminal.wait("a large picture", |screen| {
         screen.contents().lines().nth(39).is_some_and(|line| line.trim_end().ends_with("? help"))
@@ -34,7 +34,7 @@ fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal
 }
 
 #[test]
-fn the_crosshair_says_all_that_is_there() {
+fn crosshair_shows_all_facts() {
     let folder = Folder::new();
     let mut terminal = terminal(&folder, &centred(), &[]);
     terminal.press("\r");
@@ -42,7 +42,7 @@ fn the_crosshair_says_all_that_is_there() {
     for words in ["sphere \"apple\"", &place, "phong ball", "3 away", "at (", "radiance (", "normal ("] {
         terminal.wait_for(words);
     }
-    // The next key closes it; a click inspects another place, which is then the crosshair.
+    // The next key closes the facts; a click inspects another point, which becomes the crosshair.
     terminal.press("e");
     terminal.wait("no facts", |screen| !screen.contents().contains("apple"));
     terminal.press(&click(30, 10));
@@ -55,7 +55,7 @@ fn the_crosshair_says_all_that_is_there() {
 }
 
 #[test]
-fn the_focus_goes_to_the_crosshair_and_into_the_file() {
+fn focus_moves_to_the_crosshair_and_is_kept() {
     let folder = Folder::new();
     let mut terminal = terminal(&folder, &centred(), &[]);
     terminal.press("f");
@@ -66,7 +66,7 @@ fn the_focus_goes_to_the_crosshair_and_into_the_file() {
     let focus = text.split("focus at ").nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
     let depth: f64 = focus.parse().expect("a number");
     assert!((depth - 3.0).abs() < 0.01, "{depth}");
-    // Before its end, what there is would be written.
+    // An earlier `w` would save the unfinished image.
     terminal.wait_for_render(2);
     terminal.press("w");
     terminal.wait_for("wrote scene.png");
@@ -80,7 +80,7 @@ fn the_focus_goes_to_the_crosshair_and_into_the_file() {
 }
 
 #[test]
-fn a_pinhole_has_no_focus_and_no_depth_of_field() {
+fn pinhole_has_no_focus() {
     let folder = Folder::new();
     let mut terminal = terminal(&folder, &centred().replace("aperture = 0.2\n", ""), &[]);
     terminal.press("ff");
@@ -90,7 +90,7 @@ fn a_pinhole_has_no_focus_and_no_depth_of_field() {
 }
 
 #[test]
-fn the_editor_opens_at_what_was_clicked() {
+fn editor_opens_at_the_clicked_object() {
     let folder = Folder::new();
     folder.write("vi", EDITOR);
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -106,24 +106,24 @@ fn the_editor_opens_at_what_was_clicked() {
 }
 
 #[test]
-fn pixels_are_shown_around_what_was_clicked() {
+fn actual_pixels_center_on_the_click() {
     let folder = Folder::new();
     let large = SCENE.replace("width = 64", "width = 320").replace("height = 48", "height = 240");
     let mut terminal = terminal(&folder, &large, &[]);
     let before = terminal.settled(|screen| Colors::of(screen).red);
-    // The corner of the picture, where the board is not.
+    // The corner of the image, outside the board.
     terminal.press(&click(4, 4));
     terminal.wait_for("nothing at pixel");
     terminal.press("x");
     terminal
         .wait("no board", |screen| screen.contents().contains("1:1") && Colors::of(screen).red < before / 2);
     terminal.press("x");
-    // A few cells on its edges may keep their value if it is as near.
+    // A few edge cells may keep a value that is equally close.
     terminal.wait("the picture as before", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
 }
 
 #[test]
-fn the_rectangle_is_around_the_crosshair_without_the_mouse() {
+fn region_without_mouse_uses_the_crosshair() {
     let folder = Folder::new();
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
     let mut terminal = folder.terminal();

@@ -1,16 +1,16 @@
-//! The last pictures beside the newest one, with what each edit changed; the curve of noise; and `u`, which takes `c` back.
+//! The history next to the newest image, with the changes of each edit; the noise curve; and `u`, which undoes `c`.
 
 use std::fs;
 
 use super::pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, Terminal, cells, upper};
 use super::relay::Answers;
 
-/// The words of the screen, in one line.
+/// The text of the screen, in one line.
 fn words(screen: &vt100::Screen) -> String {
     screen.contents().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Words beside the picture, in one line, without the blocks of small pictures.
+/// The text right of `column`, in one line, without the blocks of thumbnails.
 fn beside(screen: &vt100::Screen, column: usize) -> String {
     let text = screen.contents();
     let is_word = |c: &char| !('▀'..='▟').contains(c);
@@ -18,7 +18,7 @@ fn beside(screen: &vt100::Screen, column: usize) -> String {
     rows.collect::<Vec<_>>().join(" ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Cells of each color from a column on.
+/// Number of cells of each color, starting at a column.
 fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     let (_, columns) = screen.size();
     let mut count = [0; 3];
@@ -37,7 +37,7 @@ fn colors_from(screen: &vt100::Screen, column: u16) -> [usize; 3] {
     count
 }
 
-/// Three saves, each in another color.
+/// Three saves, each with another color.
 fn edited(folder: &Folder, terminal: &Terminal) {
     terminal.wait_for_render(1);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
@@ -47,15 +47,15 @@ fn edited(folder: &Folder, terminal: &Terminal) {
     }
 }
 
-/// Column at which the panel begins beside a picture of 64 × 48 pixels in 120 × 40 cells.
+/// Column at which the panel begins next to an image of 64 × 48 pixels in 120 × 40 cells.
 const PANEL: u16 = 97;
 
 #[test]
-fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
+fn history_shows_images_and_their_changes() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
-    assert!(!terminal.text().contains("the last pictures"), "there is one alone");
+    assert!(!terminal.text().contains("the last pictures"), "there is only one render");
     edited(&folder, &terminal);
     terminal.wait("a strip", |screen| {
         let beside = beside(screen, PANEL.into());
@@ -63,7 +63,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
             && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
             && beside.contains("1 first")
     });
-    // A picture of each color, the newest at the top.
+    // A thumbnail of each color, the newest at the top.
     let colors = terminal.settled(|screen| colors_from(screen, PANEL));
     assert!(colors.iter().all(|count| *count >= 3), "{colors:?}");
     let row_of = |text: &str| {
@@ -75,7 +75,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
     };
     let (newest, oldest) = (row_of("▸3 mat"), row_of("1 first"));
     assert!(newest < oldest);
-    // A click shows it, and `n` what it shows.
+    // A click shows a render, and `n` continues from it.
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
     terminal.press(&click(oldest));
     terminal.wait("the red picture", |screen| colors_from(screen, 0)[0] > 500);
@@ -89,19 +89,19 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
     terminal.press(&click(newest));
     terminal.wait_for("this is the newest picture");
     terminal.wait("the blue picture", |screen| colors_from(screen, 0)[2] > 500);
-    // A narrower window has no room for it.
+    // A narrower window has no room for the history.
     terminal.resize(119, 40);
     terminal.wait("no strip", |screen| !screen.contents().contains("the last pictures"));
 }
 
-/// Several saves and a broken one are one edit in words, and so are `c` and `u`.
+/// Several saves including a broken one count as one edit, and so do `c` and `u`.
 #[test]
-fn an_entry_tells_what_changed_since_the_picture_before_it_and_nothing_else() {
+fn history_entry_names_only_its_own_change() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
     let is_told = |screen: &vt100::Screen, words: &str| {
-        // The first line says of a run that it left the picture unchanged.
+        // The first line reports a render that left the image unchanged.
         let beside = beside(screen, PANEL.into()).replace("unchanged · run", "run");
         beside.contains(words) && !beside.contains("changed") && !beside.contains("rendered again")
     };
@@ -119,9 +119,10 @@ fn an_entry_tells_what_changed_since_the_picture_before_it_and_nothing_else() {
     terminal.wait("the edit", |screen| is_told(screen, " materials. board.diffuse"));
 }
 
-/// Over a thin line no more is on the way than without a strip. (That it comes behind the picture is a test of the painter.)
+/// Checks that a slow connection has no more queued bytes than without a history. (The painter's tests check that it
+/// follows the image.)
 #[test]
-fn the_strip_comes_over_a_thin_line_too() {
+fn history_is_sent_over_slow_connections() {
     let folder = Folder::new();
     let terminal = folder.thin_line(Answers::Terminal);
     edited(&folder, &terminal);
@@ -130,7 +131,7 @@ fn the_strip_comes_over_a_thin_line_too() {
 }
 
 #[test]
-fn noise_against_time_is_a_curve_with_its_target() {
+fn noise_curve_shows_its_target() {
     let folder = Folder::new();
     let noisy = SCENE.replace("samples = 4", "samples = 10000000\nerror = 0.0001\nintegrator = \"path\"");
     folder.write("scene.toml", &noisy);
@@ -146,7 +147,7 @@ fn noise_against_time_is_a_curve_with_its_target() {
             && beside.contains("the line is the 0.01 % asked of each tile")
             && cells(screen).filter(|cell| is_braille(cell)).count() >= 10
     });
-    // Another exposure is the same render.
+    // Changing the exposure does not start another render.
     terminal.press("[");
     terminal.wait_for("exposure −0.25");
     terminal.wait_for_render(1);
@@ -158,7 +159,7 @@ fn noise_against_time_is_a_curve_with_its_target() {
 }
 
 #[test]
-fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
+fn undo_reverts_only_the_kept_camera() {
     let folder = Folder::new();
     let text = || fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     let mut terminal = folder.terminal_of(120, 40);
@@ -172,7 +173,7 @@ fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
     terminal.wait_for("camera saved to scene.toml · u: undo");
     let kept = text();
     assert_ne!(kept, SCENE);
-    // Somebody edits it: it stays as it is.
+    // After the user has edited the file, it is kept.
     let edited = kept.replace(RED, GREEN);
     folder.write("scene.toml", &edited);
     terminal.wait("the edit", |screen| Colors::of(screen).is_most("green"));
@@ -181,9 +182,9 @@ fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
     terminal
         .wait("a refusal", |screen| words(screen).contains("error: scene.toml has changed since c wrote it"));
     assert_eq!(text(), edited);
-    // The edit is taken back by hand; then `u` has something to take back.
+    // When the edit is reverted by hand, `u` can undo again.
     folder.write("scene.toml", &kept);
-    terminal.wait("the camera that was kept", |screen| Colors::of(screen).is_most("red"));
+    terminal.wait("the kept camera", |screen| Colors::of(screen).is_most("red"));
     terminal.wait_for("done");
     terminal.press("u");
     terminal.wait_for("undone: scene.toml restored");

@@ -1,4 +1,4 @@
-//! Commands that answer in lines, as a person sees them: pictures and plots among the words, no screen of their own.
+//! Commands that print lines in the terminal: images and plots between the text, without a screen of their own.
 
 use nix::sys::signal::Signal;
 
@@ -19,7 +19,7 @@ fn compared(options: &[&str], variables: &[(&str, &str)]) -> (Folder, Terminal) 
 }
 
 #[test]
-fn compare_shows_both_pictures_and_flip_above_the_table() {
+fn compare_shows_both_images_and_flip() {
     let (_folder, terminal) = compared(&[], &[]);
     terminal.look(|screen| {
         let text = screen.contents();
@@ -42,7 +42,7 @@ fn compare_shows_both_pictures_and_flip_above_the_table() {
 }
 
 #[test]
-fn compare_has_the_colours_of_the_terminal() {
+fn compare_uses_the_colors_of_the_terminal() {
     let (_folder, terminal) = compared(&[], &[("COLORTERM", "")]);
     terminal.look(|screen| {
         assert!(cells(screen).any(|cell| matches!(cell.fgcolor(), vt100::Color::Idx(16..))));
@@ -81,7 +81,7 @@ fn has_plot(screen: &vt100::Screen) -> bool {
 }
 
 #[test]
-fn bench_draws_its_plot_above_the_bar_and_takes_it_away() {
+fn bench_removes_its_plot_when_interrupted() {
     let folder = Folder::new();
     let mut terminal = measured(&folder, "1,4,16,64,65536");
     terminal.wait("the plot above the bar", |screen| has_plot(screen) && screen.contents().contains('%'));
@@ -98,7 +98,7 @@ fn bench_draws_its_plot_above_the_bar_and_takes_it_away() {
 }
 
 #[test]
-fn bench_draws_its_plot_at_the_end() {
+fn bench_keeps_its_plot_at_the_end() {
     let folder = Folder::new();
     let mut terminal = measured(&folder, "1,4");
     assert_eq!(terminal.code(), 0);

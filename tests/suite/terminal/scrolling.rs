@@ -1,9 +1,9 @@
-//! Warnings, the help under the wheel, earlier pictures, and a screen on which another program wrote.
+//! Warnings, scrolling the help with the wheel, the history, and a screen that another program wrote to.
 
 use super::pty::{BLUE, Folder, GREEN, RED, SCENE};
 
 #[test]
-fn warnings_are_told_and_shown_when_asked() {
+fn warnings_are_counted_and_shown_on_request() {
     let folder = Folder::new();
     folder.write("scene.toml", &SCENE.replace(RED, "[0.8, 0.02, 0.02], specular = [0.5, 0.5, 0.5]"));
     let mut terminal = folder.terminal();
@@ -20,7 +20,7 @@ fn warnings_are_told_and_shown_when_asked() {
 }
 
 #[test]
-fn the_wheel_scrolls_the_help_and_moves_nothing_under_it() {
+fn wheel_scrolls_only_the_help() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -37,7 +37,7 @@ fn the_wheel_scrolls_the_help_and_moves_nothing_under_it() {
 }
 
 #[test]
-fn pictures_end_at_the_oldest_and_at_the_newest() {
+fn history_ends_at_oldest_and_newest() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -60,7 +60,7 @@ fn pictures_end_at_the_oldest_and_at_the_newest() {
     }
     terminal.press("N");
     terminal.wait_for("this is the newest picture");
-    // `b` is the picture from before the last edit, not the one before in the list.
+    // `b` shows the render before the last edit, which is not the previous one in the history.
     terminal.press("n");
     terminal.wait_for_color("green");
     terminal.press("b");
@@ -68,13 +68,13 @@ fn pictures_end_at_the_oldest_and_at_the_newest() {
 }
 
 #[test]
-fn what_something_else_wrote_on_the_screen_goes_by_a_key() {
+fn ctrl_l_redraws_the_screen() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    terminal.scribble("\x1b[10;5Hsomebody was here");
-    terminal.wait_for("somebody was here");
+    terminal.scribble("\x1b[10;5Hanother program was here");
+    terminal.wait_for("another program was here");
     terminal.press("\x0c");
-    terminal.wait("it is gone", |screen| !screen.contents().contains("somebody was here"));
+    terminal.wait("the text is gone", |screen| !screen.contents().contains("another program was here"));
     terminal.wait_for_color("red");
 }

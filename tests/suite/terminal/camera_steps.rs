@@ -1,4 +1,4 @@
-//! Camera position after each key and each use of the mouse, by the numbers that `c` writes into the scene file.
+//! Camera position after each key and mouse action, from the numbers that `c` writes into the scene file.
 
 use std::fs;
 
@@ -9,14 +9,14 @@ const DOWN: &str = "\x1b[B";
 const RIGHT: &str = "\x1b[C";
 const LEFT: &str = "\x1b[D";
 
-/// The numbers of a key of the scene file.
+/// The numbers of a key in the scene file.
 fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
     let text = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     let line = text.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix(" = ")).expect(key);
     line.trim_matches(['[', ']']).split(',').map(|it| it.trim().parse().expect("a number")).collect()
 }
 
-/// Value of a key of the file after these keys and `c`. The file is then restored, and its picture is on disk.
+/// The value of a key in the file after these keys and `c`. Restores the file afterwards, and waits for its image.
 fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
     terminal.wait_for("camera moved (preview only)");
@@ -30,7 +30,7 @@ fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &
     folder.write("scene.toml", SCENE);
     terminal.wait("the scene's own picture", |_| is(own));
     terminal.wait_for("done");
-    // Keys that come before the screen shows it move the camera of the file before.
+    // Keys pressed before the screen shows the change would move the earlier camera.
     terminal.settled(|screen| screen.contents());
     kept
 }
@@ -41,12 +41,12 @@ fn assert_near(numbers: &[f64], expected: &[f64], what: &str) {
     assert!(numbers.len() == expected.len() && is_near, "{what:?}: {numbers:?} is not {expected:?}");
 }
 
-/// The camera's distance along one axis and along z after a step of 3° from a distance of 4.
+/// The camera's offset along one axis and along z after a step of 3° at a distance of 4.
 const ASIDE: f64 = 0.2093;
 const AHEAD: f64 = 3.9945;
 
 #[test]
-fn each_key_brings_the_eye_where_its_table_says() {
+fn camera_keys_move_by_documented_steps() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -79,7 +79,7 @@ fn dragged(from: (u16, u16), to: (u16, u16)) -> String {
 }
 
 #[test]
-fn the_hand_turns_the_scene_with_it_and_the_wheel_goes_nearer_and_farther() {
+fn drag_orbits_and_wheel_moves_the_camera() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -96,7 +96,7 @@ fn the_hand_turns_the_scene_with_it_and_the_wheel_goes_nearer_and_farther() {
 }
 
 #[test]
-fn a_hand_that_begins_beside_the_picture_moves_nothing() {
+fn drag_outside_the_preview_moves_nothing() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -106,7 +106,7 @@ fn a_hand_that_begins_beside_the_picture_moves_nothing() {
 }
 
 #[test]
-fn all_that_keys_changed_goes_back_at_once() {
+fn reset_undoes_every_key() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -136,7 +136,7 @@ fn all_that_keys_changed_goes_back_at_once() {
 }
 
 #[test]
-fn an_orbiter_becomes_position_and_view_when_it_is_written() {
+fn kept_orbiter_becomes_position_and_look_at() {
     let folder = Folder::new();
     let text = SCENE.replace("position = [0, 0, 4]\nlook_at = [0, 0, 0]", "orbiter = \"eye.txt\" # gKit");
     folder.write("eye.txt", "c 0 0 0\ns 4 2\n");
@@ -154,13 +154,13 @@ fn an_orbiter_becomes_position_and_view_when_it_is_written() {
 }
 
 #[test]
-fn a_camera_is_not_written_over_a_file_that_changed() {
+fn camera_is_not_kept_in_a_changed_file() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press(">");
     terminal.wait_for_render(2);
-    // Room for the words in one line.
+    // Make room for the message in one line.
     terminal.resize(120, 40);
     let broken = SCENE.replace("samples = 4", "samples = \"four\"");
     folder.write("scene.toml", &broken);

@@ -1,4 +1,4 @@
-//! The mouse, the camera in the scene file, the editor and earlier pictures, as a person meets them.
+//! The mouse, keeping the camera in the scene file, the editor, and earlier renders.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -9,7 +9,7 @@ use nix::unistd::Pid;
 
 use super::pty::{Colors, Folder, GREEN, RED, SCENE, Terminal};
 
-/// A terminal's sequence for the left button: down, moved or up, over a cell, counted from 1.
+/// A terminal's sequence for pressing the left button over a cell, counted from 1.
 fn press(column: u16, row: u16) -> String {
     format!("\x1b[<0;{column};{row}M")
 }
@@ -27,7 +27,7 @@ fn red(terminal: &Terminal) -> usize {
 }
 
 #[test]
-fn the_mouse_turns_goes_nearer_and_asks() {
+fn mouse_orbits_zooms_and_inspects() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -51,7 +51,7 @@ fn the_mouse_turns_goes_nearer_and_asks() {
 }
 
 #[test]
-fn the_mouse_is_given_back() {
+fn mouse_mode_is_restored() {
     use vt100::MouseProtocolMode::{ButtonMotion, None};
     let folder = Folder::new();
     let mut terminal = folder.terminal();
@@ -69,7 +69,7 @@ fn the_mouse_is_given_back() {
 }
 
 #[test]
-fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
+fn kept_camera_becomes_the_scene_camera() {
     let folder = Folder::new();
     let text = SCENE.replace("[camera]", "# the eye\n[camera]");
     folder.write("scene.toml", &text);
@@ -85,16 +85,16 @@ fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
     terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
     terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
-    // Its own write is not an edit: the table of stages still shows those that were reused. A key without further
-    // effect closes the message, which covers the stages.
+    // Its own write is not an edit: the stage table still shows the reused stages. A key without another effect closes
+    // the message that covers it.
     terminal.press("??");
-    terminal.wait("nothing rendered anew", |screen| screen.contents().contains("reused"));
+    terminal.wait("no new render", |screen| screen.contents().contains("reused"));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
     terminal.wait_for_color("green");
 }
 
 #[test]
-fn the_focus_goes_where_was_clicked() {
+fn click_sets_the_focus() {
     let folder = Folder::new();
     folder.write("scene.toml", &SCENE.replace("focus = 4.0", "focus = 3.0"));
     let mut terminal = folder.terminal();
@@ -112,7 +112,7 @@ pub(super) const EDITOR: &str =
     "#!/bin/sh\nprintf 'editing %s at %s\\r\\n' \"$2\" \"$1\"\nread -r line\necho \"# $line\" >> \"$2\"\n";
 
 #[test]
-fn the_editor_has_the_terminal_and_gives_it_back() {
+fn editor_borrows_the_terminal() {
     let folder = Folder::new();
     folder.write("vi", EDITOR);
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -135,7 +135,7 @@ fn the_editor_has_the_terminal_and_gives_it_back() {
 }
 
 #[test]
-fn an_editor_that_dies_in_raw_mode_leaves_a_terminal_that_echoes() {
+fn killed_editor_leaves_an_echoing_terminal() {
     let folder = Folder::new();
     folder.write("vi", "#!/bin/sh\nstty raw -echo\nkill -9 $$\n");
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -149,7 +149,7 @@ fn an_editor_that_dies_in_raw_mode_leaves_a_terminal_that_echoes() {
     assert_eq!(terminal.end(), 0);
 }
 
-/// The program with a shell script as its editor, which has the terminal.
+/// The program with a shell script as its editor, which owns the terminal.
 fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> Terminal {
     folder.write("vi", &format!("#!/bin/sh\necho $PPID > parent\necho $$ > id\n{script}\n"));
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
@@ -161,17 +161,17 @@ fn in_editor(folder: &Folder, command: &[&str], script: &str, options: &str) -> 
     terminal
 }
 
-/// The process whose number this file has.
+/// The process whose id is in this file.
 fn process(folder: &Folder, file: &str) -> Pid {
     let number = String::from_utf8(folder.bytes(file)).expect("a number");
     Pid::from_raw(number.trim().parse().expect("a number"))
 }
 
-/// A shell that runs glimt: if the terminal ended with glimt, it would reset its modes by itself.
+/// A shell that runs glimt. If the terminal closed with glimt, its modes would be reset anyway.
 const FROM_SHELL: &str = "modes=$(stty -g); \"$0\" scene.toml; code=$?; test \"$modes\" = \"$(stty -g)\" && echo as before; exit $code";
 
 #[test]
-fn a_signal_ends_the_editor_too_and_the_terminal_is_as_before() {
+fn signal_ends_the_editor_and_restores_modes() {
     for (signal, code) in [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGUSR1, 138)] {
         let folder = Folder::new();
         let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
@@ -185,10 +185,10 @@ fn a_signal_ends_the_editor_too_and_the_terminal_is_as_before() {
 }
 
 #[test]
-fn an_editor_that_hears_no_signal_does_not_keep_the_terminal_raw() {
+fn deaf_editor_does_not_keep_raw_mode() {
     let folder = Folder::new();
     let command = ["/bin/sh", "-c", FROM_SHELL, folder.program()];
-    // It ends with the terminal.
+    // The editor ends with the terminal.
     let script = "trap '' TERM HUP\nstty raw -echo\nprintf at-work\nread -r line";
     let terminal = in_editor(&folder, &command, script, "");
     kill(process(&folder, "parent"), Signal::SIGTERM).expect("sent");
@@ -196,9 +196,9 @@ fn an_editor_that_hears_no_signal_does_not_keep_the_terminal_raw() {
 }
 
 #[test]
-fn a_shell_between_does_not_keep_a_signal_from_the_editor() {
+fn signal_reaches_the_editor_through_a_shell() {
     let folder = Folder::new();
-    // As from a shell with jobs, whose terminal stays.
+    // A shell with job control, whose terminal stays open.
     let jobs = format!("set -m; {FROM_SHELL}");
     let command = ["/bin/sh", "-c", &jobs, folder.program()];
     let script = "ps -o ppid= -p $PPID > parent\nprintf at-work\nexec sleep 1000";
@@ -210,7 +210,7 @@ fn a_shell_between_does_not_keep_a_signal_from_the_editor() {
 }
 
 #[test]
-fn ctrl_c_for_the_editor_does_not_end_glimt() {
+fn ctrl_c_in_the_editor_does_not_end_glimt() {
     let folder = Folder::new();
     let command = [folder.program(), "scene.toml"];
     let mut terminal = in_editor(&folder, &command, "printf at-work\nexec sleep 1000", "");
@@ -230,7 +230,7 @@ fn ctrl_c_for_the_editor_does_not_end_glimt() {
 }
 
 #[test]
-fn an_editor_that_is_not_there_is_said() {
+fn missing_editor_is_reported() {
     let folder = Folder::new();
     let variables = [("VISUAL", "no-such-editor")];
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
@@ -241,7 +241,7 @@ fn an_editor_that_is_not_there_is_said() {
 }
 
 #[test]
-fn pictures_of_before_are_looked_at_in_turns() {
+fn earlier_renders_can_be_browsed() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -263,7 +263,7 @@ fn pictures_of_before_are_looked_at_in_turns() {
 }
 
 #[test]
-fn a_close_up_shows_the_picture_s_own_pixels() {
+fn zoom_shows_actual_pixels() {
     let folder = Folder::new();
     folder.write(
         "scene.toml",
@@ -274,7 +274,7 @@ fn a_close_up_shows_the_picture_s_own_pixels() {
     let before = red(&terminal);
     terminal.press("x");
     terminal.wait_for("1:1");
-    // The middle of the board fills the area of the picture.
+    // The middle of the board fills the preview.
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 100);
     terminal.press("x");
     terminal.wait("the picture as before", |screen| {
@@ -283,7 +283,7 @@ fn a_close_up_shows_the_picture_s_own_pixels() {
 }
 
 #[test]
-fn a_rectangle_is_rendered_first_and_the_picture_is_the_same() {
+fn region_first_does_not_change_the_image() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);

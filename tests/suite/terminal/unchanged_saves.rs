@@ -1,24 +1,25 @@
-//! Saves that change no picture: typos, their mends, and comments. They add no picture, and nothing is before them.
+//! Saves that do not change the image, such as typos, their corrections, and comments, add no history entry and are
+//! skipped by comparisons.
 
 use super::pty::{BLUE, Folder, RED, SCENE, Terminal};
 
-/// Words of the panel, without the blocks of small pictures.
+/// Text of the panel, without the blocks of thumbnails.
 fn words(screen: &vt100::Screen) -> String {
     let text: String = screen.contents().chars().filter(|c| !('▀'..='▟').contains(c)).collect();
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Breaks the scene, and mends it.
+/// Breaks the scene, then repairs it.
 fn typo(folder: &Folder, terminal: &Terminal, text: &str, while_broken: &str) {
     folder.write("scene.toml", &text.replace("radius", "radus"));
     terminal.wait_for("broken");
     terminal.wait_for(while_broken);
     folder.write("scene.toml", text);
-    terminal.wait("a mended scene", |screen| !screen.contents().contains("broken"));
+    terminal.wait("a repaired scene", |screen| !screen.contents().contains("broken"));
 }
 
 #[test]
-fn after_a_typo_b_shows_the_picture_before_the_last_edit_that_is_seen() {
+fn typo_is_not_an_edit_for_comparison() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
@@ -36,9 +37,9 @@ fn after_a_typo_b_shows_the_picture_before_the_last_edit_that_is_seen() {
     terminal.wait_for_color("blue");
 }
 
-/// Cells of a picture that is found again differ from those of its render if colors are mixed.
+/// If colors are dithered, a preview from the cache differs in some cells from the one of its render.
 #[test]
-fn in_256_colours_a_comment_and_a_typo_add_no_picture() {
+fn comment_and_typo_add_no_history_entry() {
     let folder = Folder::new();
     let soft = "samples = 200\nintegrator = \"path\"";
     let scene =
@@ -67,25 +68,25 @@ fn in_256_colours_a_comment_and_a_typo_add_no_picture() {
 }
 
 #[test]
-fn a_typo_during_a_render_leaves_one_picture_of_it() {
+fn typo_while_rendering_adds_one_entry() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
     let long = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &long);
-    // The strip has the picture once its first cells are on the screen.
+    // The history has the entry once its first cells are on the screen.
     let is_there = |screen: &vt100::Screen| words(screen).contains("▸2 render.");
-    terminal.wait("a picture under way", is_there);
+    terminal.wait("an unfinished image", is_there);
     for _ in 0..2 {
         typo(&folder, &terminal, &long, "the last good scene goes on");
         terminal.wait_for("ETA");
     }
-    terminal.wait("a picture under way", is_there);
+    terminal.wait("an unfinished image", is_there);
     terminal.press("n");
     terminal.wait_for("picture 1 of 2");
     terminal.wait("two pictures", |screen| {
         let words = words(screen);
-        // What is rendered is no picture whose render was stopped.
+        // An image that is still rendering does not count as stopped.
         words.contains("▸1 first") && words.contains(" 2 render.") && !words.contains("unfinished")
     });
 }

@@ -1,13 +1,13 @@
-//! Over a thin line, glimt answers a key at once, whatever is on the way, and the shell returns at once.
+//! Over a slow connection, glimt responds to keys immediately whatever is queued, and quitting returns immediately.
 
 use std::time::{Duration, Instant};
 
 use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
 use super::relay::Answers;
 
-/// Most bytes on their way without an answer from the terminal.
+/// Limit of bytes that the terminal has not acknowledged yet.
 const MOST: usize = 24_000;
-/// Longest time from a key to its first changed cells, and from `q` to the shell.
+/// Limit from a key to its first changed cells, and from `q` to the shell.
 const SEEN: Duration = Duration::from_millis(400);
 
 const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
@@ -30,8 +30,8 @@ fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::S
     begin.elapsed()
 }
 
-/// Checks that something took no longer than [`SEEN`] at least once. Other tests may occupy the processors, so that the least of
-/// several times is the program's own.
+/// Checks that the shortest of several attempts is within [`SEEN`]. Other tests may occupy the processors, so only the
+/// shortest time is the program's own.
 #[track_caller]
 fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
     const TRIES: u32 = 12;
@@ -46,8 +46,8 @@ fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
 }
 
 #[test]
-fn keys_are_seen_at_once_and_little_is_on_the_way() {
-    /// Number of tries, as the line itself stalls while other tests occupy the processors.
+fn keys_respond_quickly_and_little_is_queued() {
+    /// Number of attempts, because the connection itself stalls while other tests occupy the processors.
     const TRIES: u32 = 4;
     for answers in ALL {
         let mut least = usize::MAX;
@@ -57,11 +57,11 @@ fn keys_are_seen_at_once_and_little_is_on_the_way() {
                 break;
             }
         }
-        assert!(least <= MOST, "{answers:?}: {least} B in the line, or without an answer");
+        assert!(least <= MOST, "{answers:?}: {least} B queued or unacknowledged");
     }
 }
 
-/// Bytes in the line, or bytes without an answer from the terminal, while keys are pressed and the scene is saved.
+/// Queued or unacknowledged bytes while keys are pressed and the scene is saved.
 fn most_on_the_way(answers: Answers) -> usize {
     let (folder, mut terminal) = endless(answers);
     let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
@@ -72,7 +72,7 @@ fn most_on_the_way(answers: Answers) -> usize {
             time(&mut terminal, "s", words, |screen| screen.contents().contains(words))
         });
     }
-    // An edit while the line is full: the newest picture only.
+    // After an edit while the connection is busy, only the newest image is sent.
     folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 10000000"));
     terminal.wait_for_color("green");
     let (unanswered, waiting) = terminal.line(|seen| (seen.most_unanswered, seen.most_waiting));
@@ -80,7 +80,7 @@ fn most_on_the_way(answers: Answers) -> usize {
 }
 
 #[test]
-fn the_shell_is_back_at_once() {
+fn quit_returns_quickly() {
     for answers in ALL {
         assert_at_once(&format!("{answers:?}: the shell's screen"), || {
             let (_folder, mut terminal) = endless(answers);
@@ -92,15 +92,15 @@ fn the_shell_is_back_at_once() {
 }
 
 #[test]
-fn nothing_is_sent_when_nothing_happens() {
-    // All lines at once, as the time goes by in waiting.
+fn idle_program_sends_nothing() {
+    // Test all connections at once, because the test mostly waits.
     let terminals = ALL.map(|answers| {
         let folder = Folder::new();
         let terminal = folder.thin_line(answers);
         terminal.wait_for_render(1);
         (folder, terminal)
     });
-    // The last exact picture may still be on its way.
+    // The last exact preview may still be in transit.
     std::thread::sleep(Duration::from_secs(3));
     let sent = || terminals.each_ref().map(|(_, terminal)| terminal.line(|seen| seen.sent));
     let before = sent();
@@ -109,21 +109,22 @@ fn nothing_is_sent_when_nothing_happens() {
 }
 
 #[test]
-fn the_line_is_measured_and_shown() {
-    /// kB sent, and the terminal's time to answer in ms, by the line above the keys.
+fn connection_is_measured_and_shown() {
+    /// Kilobytes sent and the terminal's round trip in milliseconds, from the line above the keys.
     fn measured(screen: &vt100::Screen) -> Option<(u32, u32)> {
         let text = screen.contents();
         let words: Vec<&str> = text.lines().nth_back(1)?.split_whitespace().collect();
-        // The frame arrives in pieces: other milliseconds of that line are not those of the answer.
+        // The frame arrives in pieces: do not read other milliseconds of that line.
         let &[size, "kB", "sent,", "answered", "in", time, "ms"] = words.last_chunk()? else { return None };
         Some((size.parse().ok()?, time.parse().ok()?))
     }
-    // A busy machine makes an answer late, never early.
-    assert_at_once("the answer by the screen", || {
+    // A busy machine delays replies, never the opposite.
+    assert_at_once("the round trip on the screen", || {
         let folder = Folder::new();
         let mut terminal = folder.thin_line(Answers::Terminal);
         terminal.wait_for_render(1);
-        // On a machine that stands still for a second, the first answer comes too late to be measured. Then another picture tells.
+        // If the machine stalls for a second, the first reply is too late to be measured, and another preview is
+        // needed.
         let mut seen = terminal.settled(measured);
         for _ in 0..20 {
             if seen.is_some() {
@@ -132,7 +133,7 @@ fn the_line_is_measured_and_shown() {
             terminal.press("s");
             seen = terminal.settled(measured);
         }
-        let (size, time) = seen.expect("bytes and time of the last picture");
+        let (size, time) = seen.expect("bytes and time of the last preview");
         assert!((1..200).contains(&size) && time >= 150, "{size} kB, {time} ms");
         terminal.press("?");
         terminal.wait_for("the terminal's time to answer");
@@ -141,14 +142,14 @@ fn the_line_is_measured_and_shown() {
 }
 
 #[test]
-fn a_terminal_that_takes_nothing_does_not_hold_up_the_end() {
+fn stalled_terminal_does_not_block_quitting() {
     assert_at_once("the end", || {
         let folder = Folder::new();
         folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
         let mut terminal = folder.terminal();
         terminal.wait_for("ETA");
         terminal.set_reading(false);
-        // Each view is another picture, until nothing more fits in.
+        // Show another view each time, until the terminal's buffer is full.
         for _ in 0..40 {
             terminal.press("v");
             std::thread::sleep(Duration::from_millis(100));
@@ -163,9 +164,9 @@ fn a_terminal_that_takes_nothing_does_not_hold_up_the_end() {
     });
 }
 
-/// Checks the redraw: a terminal cuts what does not fit, and the program may see only the last size.
+/// Checks the redraw: a terminal truncates what does not fit, and the program may see only the last size.
 #[test]
-fn a_window_that_shrinks_and_grows_at_once_is_drawn_anew() {
+fn quick_shrink_and_grow_redraws_the_window() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
