@@ -1,5 +1,6 @@
 //! Validates the arguments of a render and lowers them to an [`Order`].
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use crate::args::{Progress, RenderArgs};
@@ -103,12 +104,13 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
             return Err(format!("{name} cannot be used with --turntable, which has no checkpoints"));
         }
     }
-    for (index, path) in args.outputs.iter().enumerate() {
+    let mut known = HashSet::new();
+    for path in &args.outputs {
         if MovingFormat::of(path).is_none() {
             Format::of(path).map_err(|error| format!("{error}, or for a turntable .gif, .apng"))?;
         }
         turntable::check_name(path)?;
-        check_once(&args.outputs, index)?;
+        check_once(path, &mut known)?;
     }
     if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
@@ -123,10 +125,9 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     }
 }
 
-/// Rejects an output given twice.
-fn check_once(outputs: &[PathBuf], index: usize) -> Result<(), String> {
-    let path = &outputs[index];
-    if outputs[..index].contains(path) {
+/// Rejects a path that is already known, and adds it otherwise.
+fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
+    if !known.insert(path) {
         return Err(format!("-o {} is given twice", path.display()));
     }
     Ok(())
@@ -134,7 +135,8 @@ fn check_once(outputs: &[PathBuf], index: usize) -> Result<(), String> {
 
 /// Checks that all extensions are known and no output is given twice.
 fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
-    for (index, path) in outputs.iter().enumerate() {
+    let mut known = HashSet::new();
+    for path in outputs {
         if MovingFormat::of(path).is_some() {
             let name = path.display();
             return Err(format!(
@@ -142,7 +144,7 @@ fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
             ));
         }
         Format::of(path).map_err(|error| error.to_string())?;
-        check_once(outputs, index)?;
+        check_once(path, &mut known)?;
     }
     Ok(())
 }

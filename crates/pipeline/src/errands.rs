@@ -187,6 +187,7 @@ fn replace(
     let guard = write::Guard {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
+        sweep: None,
         losses: Losses::Refused,
     };
     write::atomic_in_place_of(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())

@@ -11,7 +11,7 @@ use super::render::keeping::path_of as checkpoint_of;
 use super::report::Marks;
 use super::sink::Sink;
 use crate::output::part::{self, PartFile};
-use crate::output::write::Guard;
+use crate::output::write::{FolderSweep, Guard};
 use crate::output::{
     FileIdentity, Losses, OutputError, Replaced, replaced_json, replaced_picture, scene_of_picture,
     scene_path,
@@ -21,9 +21,21 @@ use crate::scene::is_mesh;
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Target<'a> {
+pub(super) struct Target<'a> {
     path: &'a Path,
     kind: Kind,
+}
+
+impl<'a> Target<'a> {
+    /// An image of the plan.
+    pub(super) fn picture(plan: &Plan, path: &'a Path) -> Self {
+        Self { path, kind: Kind::Picture(plan.named_by) }
+    }
+
+    /// A report.
+    pub(super) fn report(path: &'a Path) -> Self {
+        Self { path, kind: Kind::Report }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -70,10 +82,10 @@ fn linked(plan: &Plan) -> Vec<Diagnostic> {
 ///
 /// # Errors
 /// Those of writing; [`OutputError::Refused`].
-pub(super) fn guarded<T>(
-    plan: &Plan,
+pub(super) fn guarded<'a, T>(
+    plan: &'a Plan,
     inputs: &Inputs,
-    path: &Path,
+    (target, sweep): (Target<'a>, Option<&FolderSweep>),
     sink: &Sink,
     write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
@@ -81,11 +93,13 @@ pub(super) fn guarded<T>(
         let inputs = inputs.on_disk();
         // Targets were compared when the write stage began; since then only links can have changed.
         let twin = |target: Target<'_>, at: &FileIdentity| {
-            let mut others = targets_now(plan).filter(|other| real != path && *other != target);
+            if real == target.path {
+                return None;
+            }
+            let mut others = targets_now(plan).filter(|other| *other != target);
             others.find(|other| FileIdentity::of(other.path).as_ref() == Some(at))
         };
-        let mut found = targets(plan).filter(|target| target.path == path);
-        match found.find_map(|target| conflict(plan, target, real, &inputs, twin)) {
+        match conflict(plan, target, real, &inputs, twin) {
             Some(conflict) => Err(OutputError::Refused { reason: in_a_line(&conflict) }),
             None => Ok(()),
         }
@@ -93,6 +107,7 @@ pub(super) fn guarded<T>(
     write(&Guard {
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
+        sweep,
         losses: Losses::Told(&|what| sink.not_kept(what)),
     })
 }
@@ -105,14 +120,14 @@ fn in_a_line(conflict: &Diagnostic) -> String {
 
 /// Everything that this call writes: what the request writes, then the pictures of a turntable that are still to come.
 fn targets(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
-    let picture = |path| Target { path, kind: Kind::Picture(plan.named_by) };
+    let picture = |path| Target::picture(plan, path);
     targets_now(plan).chain(plan.to_come.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// The pictures, then the report.
 fn targets_now(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
-    let picture = |path| Target { path, kind: Kind::Picture(plan.named_by) };
-    let report = plan.report.iter().map(|path| Target { path, kind: Kind::Report });
+    let picture = |path| Target::picture(plan, path);
+    let report = plan.report.iter().map(|path| Target::report(path));
     let pictures = plan.outputs.iter().chain(&plan.moving);
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }

@@ -126,7 +126,7 @@ impl<'a> ErrorImage<'a> {
         let is_kept = |path: &Path| check_not_input(path, path, args).is_err();
         let lost = RefCell::new(None);
         let losses = Losses::Told(&|what| drop(lost.replace(Some(what))));
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         write::atomic_until(self.path, &bytes, &guard, &token)?;
         Ok(lost.into_inner())
     }

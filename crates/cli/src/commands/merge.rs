@@ -300,7 +300,8 @@ impl Merge<'_> {
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_one_file(part, path));
         let tell = |what: String| self.console.say(&format!("warning: {what}"));
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Told(&tell) };
+        let guard =
+            Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses: Losses::Told(&tell) };
         let bytes = self.pool.install(|| finish.encode(film, (&finish.image(film), &[]), format, token));
         let written = bytes.and_then(|bytes| atomic_until(out, &bytes, &guard, token));
         written.map_err(|error| match error {

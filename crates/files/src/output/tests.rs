@@ -1,5 +1,6 @@
 use std::io::Cursor;
 
+use super::temporary::tests::dead_name;
 use super::*;
 use crate::film::tone::{Tonemap, develop, develop16};
 use crate::math::Vec3;
@@ -299,8 +300,12 @@ fn what_a_format_cannot_hold_is_said() {
     assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
 }
 
-const NOTHING_KEPT: write::Guard<'_> =
-    write::Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Told(&|_| ()) };
+const NOTHING_KEPT: write::Guard<'_> = write::Guard {
+    is_kept: &|_| false,
+    may_replace: &|_| Ok(()),
+    sweep: None,
+    losses: Losses::Told(&|_| ()),
+};
 
 #[test]
 fn what_is_cancelled_is_neither_encoded_nor_written() {
@@ -317,6 +322,27 @@ fn what_is_cancelled_is_neither_encoded_nor_written() {
     assert!(matches!(stopped, Err(OutputError::Cancelled(_))));
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
+}
+
+#[test]
+fn many_writes_search_a_folder_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let other = folder.path().join("other");
+    std::fs::create_dir(&other).expect("a folder");
+    let write_two = |guard: &write::Guard<'_>| {
+        let mut kept = Vec::new();
+        for at in [folder.path(), &other].repeat(2) {
+            let stale = at.join(dead_name("stale.png"));
+            std::fs::write(&stale, "half").expect("written");
+            write::atomic_until(&at.join("a.png"), b"new", guard, &CancelToken::new()).expect("written");
+            kept.push(stale.exists());
+        }
+        kept
+    };
+    let sweep = write::FolderSweep::default();
+    let guard = write::Guard { sweep: Some(&sweep), ..NOTHING_KEPT };
+    assert_eq!(write_two(&guard), [false, false, true, true]);
+    assert_eq!(write_two(&NOTHING_KEPT), [false; 4]);
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Atomic writes: the old file stays until the new one is whole.
 
+use std::cell::RefCell;
+use std::collections::HashSet;
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::os::fd::AsFd;
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Once};
 
@@ -32,7 +34,8 @@ pub const STDOUT: &str = "/dev/stdout";
 /// # Errors
 /// Names the path, the system's message and the way out. The old file is then untouched, and no temporary file is left.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Told(&|_| ()) };
+    let losses = Losses::Told(&|_| ());
+    let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
     atomic_until(path, bytes, &guard, &CancelToken::new())
 }
 
@@ -56,8 +59,22 @@ pub struct Guard<'a> {
     pub is_kept: &'a dyn Fn(&Path) -> bool,
     /// Whether the new file may replace this one, existing or not; or whether it may be written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
+    /// Folders already searched for temporary files of killed writers. `None` to search at every write.
+    pub sweep: Option<&'a FolderSweep>,
     /// Policy for a file whose owner, access list or attributes cannot be kept.
     pub losses: Losses<'a>,
+}
+
+/// Folders from which temporary files of killed writers were removed: writing many files to a folder searches it once.
+#[derive(Debug, Default)]
+pub struct FolderSweep(RefCell<HashSet<PathBuf>>);
+
+impl FolderSweep {
+    /// Whether the folder has not been searched yet. Then it counts as searched.
+    fn is_due(&self, folder: &Path) -> bool {
+        let mut searched = self.0.borrow_mut();
+        !searched.contains(folder) && searched.insert(folder.to_owned())
+    }
 }
 
 /// [`atomic`] with a guard; it can be stopped until the new file is whole.
@@ -187,7 +204,9 @@ pub fn prepare_process() {
 /// only its owner and users on its access list can read it.
 fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
     let directory = target.directory();
-    temporary::remove_stale(directory, guard.is_kept);
+    if guard.sweep.is_none_or(|sweep| sweep.is_due(directory)) {
+        temporary::remove_stale(directory, guard.is_kept);
+    }
     let mode = if target.existing.is_some() { 0o600 } else { 0o666 };
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
     let new = Temporary::create(directory, name, mode)?;

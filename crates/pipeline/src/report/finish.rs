@@ -14,7 +14,7 @@ use crate::protocol::StageReport;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::sink::Sink;
-use crate::targets::guarded;
+use crate::targets::{Target, guarded};
 use crate::world::World;
 
 /// Results of a request.
@@ -62,7 +62,8 @@ pub(crate) fn write_report(
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
-    guarded(plan, inputs, path, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
+    let target = (Target::report(path), None);
+    guarded(plan, inputs, target, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
 }
 
 /// Removes the report of an earlier image, where an unfinished image took its place. Leaves files that a report must not replace.

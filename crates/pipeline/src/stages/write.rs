@@ -1,6 +1,6 @@
 //! Encoding and writing pictures, each only when it would differ from what was written.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -11,7 +11,7 @@ use super::super::protocol::Writing;
 use super::super::render::film_state::FilmState;
 use super::super::render::keeping::head;
 use super::super::sink::Sink;
-use super::super::targets::{conflicts, guarded};
+use super::super::targets::{Target, conflicts, guarded};
 use super::super::turntable::Turn;
 use super::super::watch::content::{Content, Contents};
 use super::{Staged, Stop};
@@ -21,7 +21,7 @@ use crate::film::tone::develop;
 use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, Head, Kind};
-use crate::output::write::{Durability, Guard};
+use crate::output::write::{Durability, FolderSweep, Guard};
 use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError, scene_path};
 use crate::output::{MovingFormat, moving};
 use crate::scene::fingerprint::{Fingerprint, Key};
@@ -36,6 +36,8 @@ pub(crate) struct Written {
     files: HashMap<PathBuf, (Key, Content)>,
     /// The scene's own image, if all its files hold it.
     pub(crate) own: Option<Key>,
+    /// Folders of this write, or of the images of a turntable so far, without temporary files of killed writers.
+    sweep: FolderSweep,
 }
 
 impl Written {
@@ -145,6 +147,9 @@ fn write(
     is_must: bool,
 ) -> Result<Staged<bool>, Stop> {
     let Destination { plan, contents, is_own, sink, .. } = to;
+    if plan.turn.is_none_or(|turn| turn.number == 0) {
+        written.sweep = FolderSweep::default();
+    }
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
@@ -157,13 +162,13 @@ fn write(
         }
         contents.outputs.begin(path);
         let wrote = match canvas.share {
-            Some(_) => write_part(canvas, to, path, token),
+            Some(_) => write_part(canvas, to, (path, &written.sweep), token),
             None => {
                 let image = radiance.get_or_insert_with(|| canvas.film.image(plan.settings.view.quantity()));
                 token
                     .check()
                     .map_err(OutputError::from)
-                    .and_then(|()| write_one(image, canvas, to, path, token))
+                    .and_then(|()| write_one(image, canvas, to, (path, &written.sweep), token))
             }
         };
         match wrote {
@@ -185,8 +190,9 @@ fn write(
             }
         }
     }
-    written.files.retain(|path, _| plan.outputs.contains(path));
-    contents.outputs.retain(|path| plan.outputs.contains(path));
+    let outputs: HashSet<&PathBuf> = plan.outputs.iter().collect();
+    written.files.retain(|path, _| outputs.contains(path));
+    contents.outputs.retain(|path| outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
             // Report each failure by itself, but for the last one if that is the reason why the request fails.
@@ -252,7 +258,7 @@ pub(crate) fn write_moving(
             let metadata = finish_at(plan, path).metadata_with(samples);
             let bytes = moving::encode(&frames, &metadata, format, token)?;
             let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
-            guarded(plan, inputs, path, sink, write)?;
+            guarded(plan, inputs, (Target::picture(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
         match write() {
@@ -268,7 +274,7 @@ fn write_one(
     image: &RadianceImage,
     canvas: &FilmState,
     Destination { plan, layers, inputs, sink, .. }: Destination<'_>,
-    path: &Path,
+    (path, sweep): (&Path, &FolderSweep),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let mut finish = finish_at(plan, path);
@@ -277,7 +283,8 @@ fn write_one(
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
     let bytes = finish.encode(&canvas.film, (image, layers), Format::of(path)?, token)?;
-    guarded(plan, inputs, path, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
+    let target = (Target::picture(plan, path), Some(sweep));
+    guarded(plan, inputs, target, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 
@@ -285,7 +292,7 @@ fn write_one(
 fn write_part(
     canvas: &FilmState,
     Destination { plan, inputs, sink, .. }: Destination<'_>,
-    path: &Path,
+    (path, sweep): (&Path, &FolderSweep),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let identity = canvas.identity.clone().unwrap_or_default();
@@ -294,7 +301,7 @@ fn write_part(
     let save = |guard: &Guard<'_>| {
         part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
-    guarded(plan, inputs, path, sink, save)?;
+    guarded(plan, inputs, (Target::picture(plan, path), Some(sweep)), sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
 

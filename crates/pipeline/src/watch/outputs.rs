@@ -63,13 +63,14 @@ impl Outputs {
     /// Notes the content of a file that was written, or that it could not be written. Special files are not watched.
     pub(crate) fn end(&self, path: &Path, content: Option<Content>) {
         let mut known = self.known();
-        if let Some(output) = known.get_mut(path) {
-            output.is_being_written = false;
-            if let Some(content) = content {
-                (output.content, output.reported) = (content, None);
-            }
+        let Some(output) = known.get_mut(path) else { return };
+        output.is_being_written = false;
+        if let Some(content) = content {
+            (output.content, output.reported) = (content, None);
         }
-        known.retain(|_, output| output.is_being_written || matches!(output.content, Content::Hash(_)));
+        if !matches!(output.content, Content::Hash(_)) {
+            known.remove(path);
+        }
     }
 
     /// Forgets all files but these.

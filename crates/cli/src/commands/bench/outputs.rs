@@ -161,7 +161,7 @@ impl BenchOutputs {
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
         let losses = Losses::Told(&|what| progress.warned(&what));
-        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses };
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
         let written = write::atomic_until(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }

@@ -43,7 +43,8 @@ fn head(index: u32, count: u32, film: &Film) -> Head {
     }
 }
 
-const OPEN: Guard<'static> = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Refused };
+const OPEN: Guard<'static> =
+    Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses: Losses::Refused };
 
 fn put(folder: &Path, name: &str, head: &Head, film: &Film) -> PathBuf {
     let path = folder.join(name);

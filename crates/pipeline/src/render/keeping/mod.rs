@@ -415,6 +415,7 @@ impl<'a> Keeping<'a> {
         let guard = Guard {
             is_kept: &|path| inputs.contain(path),
             may_replace: &may_replace,
+            sweep: None,
             losses: Losses::Told(&|_| ()),
         };
         // Nobody cancels this: it is short, and a signal may be its reason.
