@@ -78,7 +78,7 @@ pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)
     };
-    guarded(plan, inputs, path, sink, remove)
+    guarded(plan, inputs, (Target::report(path), None), sink, remove)
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {
