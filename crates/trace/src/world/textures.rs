@@ -383,3 +383,52 @@ fn file_textures(
         Some((texture, used))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use super::*;
+
+    /// Uses of the textures of one material, in the order of its roles.
+    fn uses(material: &str) -> Vec<TextureUse> {
+        let text = format!(
+            "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n\
+             [textures.leaf]\nfile = '../../assets/textures/leaf.png'\nencoding = 'srgb'\n\
+             [textures.same]\nfile = '../../assets/textures/leaf.png'\nencoding = 'srgb'\n\
+             [textures.moved]\nfile = '../../assets/textures/leaf.png'\noffset = [0.5, 0]\nencoding = 'srgb'\n\
+             [textures.other]\nfile = '../../assets/textures/bumps.png'\n\
+             [materials.m]\n{material}\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = 'm'\n"
+        );
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scene.toml");
+        let outcome = crate::scene::parse(Arc::from(text.as_str()), &path);
+        let scene = outcome.scene.unwrap_or_else(|| panic!("{:?}: {text}", outcome.diagnostics));
+        let found = scene.materials.iter().find(|material| material.name == "m").expect("the material");
+        found.textures().into_iter().map(|used| texture_use(&scene, found, used)).collect()
+    }
+
+    #[test]
+    fn a_color_under_its_own_alpha_is_a_cut_out() {
+        const MASK: TextureUse = TextureUse::Number(PixelValue::Mask { of_any_color: false });
+        const ALPHA: TextureUse = TextureUse::Number(PixelValue::Channel(Channel::Alpha));
+        const OPACITY: TextureUse = TextureUse::Number(PixelValue::Opacity);
+        let (color, cut_out) = (TextureUse::Color, TextureUse::CutOut);
+        let both = |diffuse: &str, opacity: &str| {
+            let mut uses = uses(&format!("diffuse = {{ texture = '{diffuse}' }}\nopacity = {{ {opacity} }}"));
+            uses.dedup();
+            uses
+        };
+        assert_eq!(both("leaf", "texture = 'leaf'"), [cut_out, OPACITY]);
+        assert_eq!(both("leaf", "texture = 'same'"), [cut_out, OPACITY]);
+        assert_eq!(both("leaf", "texture = 'leaf', channel = 'a'"), [cut_out, ALPHA]);
+        // The same image elsewhere on the surface: its colors are not those under the alpha, which is still that of colors.
+        assert_eq!(both("leaf", "texture = 'moved'"), [color, OPACITY]);
+        // An image for opacity only is a mask.
+        assert_eq!(both("leaf", "texture = 'other'"), [color, MASK]);
+        assert_eq!(uses("diffuse = 0.5\nopacity = { texture = 'leaf' }"), [MASK]);
+        let red = TextureUse::Number(PixelValue::Channel(Channel::Red));
+        assert_eq!(both("leaf", "texture = 'leaf', channel = 'r'"), [color, red]);
+        assert_eq!(uses("normal_map = 'other'"), [TextureUse::Normal]);
+    }
+}
