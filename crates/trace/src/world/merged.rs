@@ -30,6 +30,10 @@ const MIN_FACETS: usize = 8;
 /// Maximum coordinate of a merged mesh, relative to its size; farther out, rounding would distort it.
 const MAX_RELATIVE_COORDINATE: f32 = 1024.0;
 
+/// Maximum size of a transformed mesh, relative to the scene's smallest object; the rounded corners of a larger one would move it by more
+/// than 1/256 of that object.
+const MAX_RELATIVE_SIZE: f32 = (1 << 17) as f32;
+
 /// Identifies a triangle of the merged tree in its object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MergedTriangle {
@@ -62,7 +66,9 @@ impl MergedMeshes {
     pub fn of_objects(objects: &mut [Object], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         // Choose the smallest meshes first, within the budget of triangles to rebuild after each edit.
         let count = |object: &Object| object.mesh().map_or(0, MeshInstance::triangle_count);
-        let mut chosen: Vec<usize> = (0..objects.len()).filter(|&id| may_be_merged(&objects[id])).collect();
+        let least = least_size(objects);
+        let mut chosen: Vec<usize> =
+            (0..objects.len()).filter(|&id| may_be_merged(&objects[id], least)).collect();
         chosen.sort_by_key(|&id| (count(&objects[id]), id));
         let mut total = 0;
         chosen.retain(|&id| {
@@ -330,11 +336,22 @@ fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
 }
 
 /// Whether an object is a mesh small enough to merge, with world coordinates that `f32` represents well.
-fn may_be_merged(object: &Object) -> bool {
+/// Size of the smallest finite object; infinite if there is none.
+fn least_size(objects: &[Object]) -> f32 {
+    let bounds = objects.iter().filter_map(Object::bounds).filter(|bounds| !bounds.is_empty());
+    let sizes = bounds.map(|bounds| bounds.extent().max_element());
+    sizes.filter(|size| *size > 0.0).fold(f32::INFINITY, f32::min)
+}
+
+/// Whether an object is a mesh to merge, in a scene whose smallest object has the size `least`.
+fn may_be_merged(object: &Object, least: f32) -> bool {
     let Some(mesh) = object.mesh() else { return false };
     let Some(bounds) = object.bounds().filter(|bounds| !bounds.is_empty()) else { return false };
     let greatest = bounds.min.abs().max(bounds.max.abs()).max_element();
     let size = bounds.extent().max_element();
+    if mesh.is_transformed() && size > MAX_RELATIVE_SIZE * least {
+        return false;
+    }
     let count = mesh.triangle_count();
     (1..=MAX_PER_MESH).contains(&count) && greatest.is_finite() && greatest <= MAX_RELATIVE_COORDINATE * size
 }
@@ -390,6 +407,30 @@ pub(super) mod tests {
                 if i % 2 == 0 { Ray::new(vector() * 3.0, vector()) } else { Ray::segment(vector(), vector()) }
             })
             .collect()
+    }
+
+    #[test]
+    fn a_huge_moved_mesh_keeps_its_plane() {
+        let corners = [Vec3::new(-1e7, 0.0, 1e7), Vec3::new(1e7, 0.0, 1e7), Vec3::new(0.0, 0.0, -1e7)];
+        let ground =
+            TriangleMesh { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
+        let loaded = Arc::new(LoadedMesh { mesh: ground, ..LoadedMesh::default() });
+        let ground =
+            Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"));
+        let small = mesh(7, 100);
+        let shift = DVec3::new(0.37, 0.11, -0.21);
+        let turned = Transform::scale_rotate_translate(DVec3::ONE, DVec3::new(0.0, 0.0, 17.3), shift);
+        let below = turned.point(DVec3::NEG_Y * 9.0);
+        let away = Transform::scale_rotate_translate(DVec3::ONE, DVec3::ZERO, below);
+        let geometry = geometry(objects(&[(&ground, turned), (&small, away), (&small, away)]));
+        assert!(geometry.has_merged());
+        let up = turned.point(DVec3::Y) - shift;
+        for ray in rays(8).iter().map(|ray| Ray::new(ray.origin + up.as_vec3() * 5.0, -up.as_vec3())) {
+            let hit = geometry.closest(&ray).expect("the ground");
+            let exact = (ray.origin.as_dvec3() - shift).dot(up);
+            assert_eq!(hit.object, 0);
+            assert!((f64::from(hit.shape.t) - exact).abs() < 1e-4, "{} {exact}", hit.shape.t);
+        }
     }
 
     #[test]

@@ -103,6 +103,11 @@ impl MeshInstance {
         self.tree.loaded().mesh.triangles.len()
     }
 
+    /// Whether the corners in world coordinates differ from those of the mesh.
+    pub(super) fn is_transformed(&self) -> bool {
+        self.is_transformed
+    }
+
     /// Corners of a triangle in world coordinates, rounded to `f32`, in file order.
     pub(super) fn rounded_corners(&self, triangle: u32) -> [Vec3; 3] {
         let corners = self.tree.loaded().mesh.corners(triangle);
