@@ -12,8 +12,10 @@ use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
 use crate::system::memory::{Limit, limit};
 
-/// Bytes of the program itself, with its threads.
+/// Bytes of the program itself.
 const PROGRAM: u64 = 24 << 20;
+/// Bytes of a thread that renders: its stack and buffers. Rough glass takes the most.
+const THREAD: u64 = 640 << 10;
 /// Bytes of an object of any kind, in its tree.
 const OBJECT: u64 = 250;
 /// Bytes that the photons of a pass take while their maps are built, for each that is emitted.
@@ -42,7 +44,13 @@ impl Foretold {
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
         let (film, picture) =
             Film::memory_for((render.width, render.height), plan.crop.unwrap_or(whole), blocks(plan));
-        let mut items = vec![("the program", PROGRAM), ("the film", film), ("the picture", picture)];
+        let threads = plan.threads as u64 * THREAD;
+        let mut items = vec![
+            ("the program", PROGRAM),
+            ("the film", film),
+            ("the picture", picture),
+            ("the threads", threads),
+        ];
         if !plan.layers.is_empty() {
             // One film at a time, and a picture of each.
             items.push(("the layers", film + picture * plan.layers.len() as u64));
@@ -185,7 +193,17 @@ mod tests {
     use crate::tests::loaded_of;
 
     fn planned(overrides: &Overrides) -> Plan {
-        plan(&loaded_of("").scene, Path::new("a.toml"), overrides).expect("a plan")
+        let overrides = Overrides { threads: overrides.threads.or(Some(1)), ..overrides.clone() };
+        plan(&loaded_of("").scene, Path::new("a.toml"), &overrides).expect("a plan")
+    }
+
+    #[test]
+    fn every_thread_counts() {
+        let bytes = |threads| {
+            let overrides = Overrides { threads: Some(threads), ..Overrides::default() };
+            Foretold::of_picture(&planned(&overrides)).bytes()
+        };
+        assert_eq!(bytes(65) - bytes(1), 64 * THREAD);
     }
 
     #[test]
@@ -230,7 +248,7 @@ mod tests {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
-        assert!(said.contains("needs about 41 MiB of memory"), "{said}");
+        assert!(said.contains("needs about 42 MiB of memory"), "{said}");
         assert!(said.contains("more than the 8 MiB of the control group (x); "), "{said}");
         assert!(said.ends_with("raise the limit, or try anyway with --memory 1GiB"), "{said}");
         assert!(check(&Overrides { memory: Some(1 << 30), ..Overrides::default() }).is_ok());

@@ -74,11 +74,16 @@ fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     }
 }
 
+/// Threads to allow for if `--threads` is not given: a node may have more processors than this machine.
+const NODE_THREADS: usize = 64;
+
 /// Memory request of a container in MiB: the estimate for one part plus 25 %. Prints a warning and returns `None` if the scene
 /// cannot be read.
 fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
     let mut overrides = options.overrides();
     (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
+    // The nodes may have more processors than this machine.
+    overrides.threads = overrides.threads.filter(|count| *count > 0).or(Some(NODE_THREADS));
     let why = match memory_needed(&args.scene, &overrides) {
         Ok(bytes) => return Some((bytes + bytes / 4).div_ceil(1 << 20)),
         Err(Failure::Work(why)) => why,
@@ -364,6 +369,21 @@ mod tests {
         let words: Vec<&str> = printed.lines().collect();
         let part = format!("{picture}.4.part");
         assert_eq!(words, [scene, "--once", "-o", &part, "--shard", "4/8", "--resume"]);
+    }
+
+    #[test]
+    fn stated_memory_is_enough_for_large_nodes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scene = folder.path().join("a.toml");
+        std::fs::write(&scene, "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n").expect("written");
+        let stated = |threads: &str| {
+            let line = format!("{} -o a.png --shards 8 --engine kubernetes", scene.display());
+            let args = args(&format!("{line} -- {threads}"));
+            let options = check_options(&args).expect("options of a render");
+            memory(&args, &options, &Console::new(crate::tui::ColorChoice::None))
+        };
+        assert_eq!(stated("--threads 0"), stated("--threads 64"));
+        assert!(stated("--threads 0") > stated("--threads 2"), "{:?}", stated("--threads 0"));
     }
 
     #[test]
