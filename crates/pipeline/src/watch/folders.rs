@@ -42,6 +42,16 @@ fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
+/// The watcher, unless its thread could not be started: then its handler, which shares `names`, is gone, and all that the watcher can
+/// do is panic, also when it is dropped.
+fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
+    if Arc::strong_count(names) > 1 {
+        return Some(watcher);
+    }
+    std::mem::forget(watcher);
+    None
+}
+
 impl Folders {
     pub(super) fn new(poll: bool, say: impl Fn(Hint) + Send + 'static) -> Self {
         let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
@@ -53,6 +63,7 @@ impl Folders {
             }
         };
         let watcher = if poll { None } else { notify::recommended_watcher(handler).ok() };
+        let watcher = watcher.and_then(|watcher| if_alive(watcher, &names));
         Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
@@ -182,6 +193,23 @@ mod tests {
     use notify::event::{CreateKind, DataChange, RemoveKind};
 
     use super::*;
+
+    /// As the watcher of a thread that was not started.
+    struct Dead;
+
+    impl Drop for Dead {
+        fn drop(&mut self) {
+            panic!("dropped");
+        }
+    }
+
+    #[test]
+    fn watchers_without_threads_are_not_used() {
+        let names: Arc<Mutex<HashSet<OsString>>> = Arc::default();
+        assert!(if_alive(Dead, &names).is_none());
+        let _handler = names.clone();
+        assert_eq!(if_alive(1, &names), Some(1));
+    }
 
     #[test]
     fn an_event_says_whether_a_save_is_over() {
