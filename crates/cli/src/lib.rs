@@ -36,8 +36,18 @@ pub use self::exit::Exit;
 use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 
+/// Makes work in rayon's global thread pool panic in tests: that pool ignores `--threads`, and panics if the system has no threads
+/// left. After a failed attempt, rayon does not start the pool again.
+#[cfg(debug_assertions)]
+fn forbid_global_pool() {
+    let refuse = |_| Err(std::io::Error::other("the global pool is not used"));
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).spawn_handler(refuse).build_global();
+}
+
 /// Runs a command line and returns its exit code.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
+    #[cfg(debug_assertions)]
+    forbid_global_pool();
     crate::output::write::prepare_process();
     // If the handler cannot be installed, an abort ends the process as usual.
     let _ = crate::system::abort::catch();
