@@ -49,7 +49,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         }
     }) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
+        Err(error) => return console.fail(Exit::FAILED, &signals::failure(&error)),
     };
     let mut deadline = Deadline::default();
     let mut written = WrittenFiles::default();

@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicI32, Ordering};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
+use crate::system::describe_error;
+
 /// The first signal received, if any.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReceivedSignal(Arc<AtomicI32>);
@@ -23,6 +25,14 @@ pub(super) fn name(number: i32) -> Option<&'static str> {
         SIGTERM => Some("SIGTERM"),
         _ => None,
     }
+}
+
+/// Explains why [`catch`] failed, and what to do.
+pub(super) fn failure(error: &std::io::Error) -> String {
+    format!(
+        "cannot listen to signals: {}; raise the limits on open files and on processes (ulimit -n, ulimit -u)",
+        describe_error(error)
+    )
 }
 
 /// Installs handlers that call `on_signal` on a separate thread instead of terminating the process.

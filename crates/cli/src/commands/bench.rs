@@ -46,7 +46,7 @@ fn try_run(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
     let (token, writing) = (CancelToken::new(), CancelToken::new());
     let stop = [token.clone(), writing.clone()];
     let ended = signals::catch(move || stop[usize::from(stop[0].is_cancelled())].cancel())
-        .map_err(|error| console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")))?;
+        .map_err(|error| console.fail(Exit::FAILED, &signals::failure(&error)))?;
     let mut progress = BenchProgress::new(args.progress, console);
     let (news, work) = start(order, token.clone())
         .map_err(|error| console.fail(Exit::FAILED, &start_failure("a thread", false, &error)))?;

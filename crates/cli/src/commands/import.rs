@@ -18,7 +18,7 @@ pub(crate) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let cancel = token.clone();
     let ended = match signals::catch(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
+        Err(error) => return console.fail(Exit::FAILED, &signals::failure(&error)),
     };
     let exit = convert(args, console, &token);
     let Some(number) = ended.by() else { return exit };

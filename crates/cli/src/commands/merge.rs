@@ -36,7 +36,7 @@ pub(crate) fn run(args: &MergeArgs, console: &Console) -> Exit {
     let cancel = token.clone();
     let ended = match signals::catch(move || cancel.cancel()) {
         Ok(ended) => ended,
-        Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
+        Err(error) => return console.fail(Exit::FAILED, &signals::failure(&error)),
     };
     let exit = Merge { args, console, token: &token, pool: &pool }.run();
     ended.by().map_or(exit, |number| report_signal(number, console))

@@ -3,6 +3,8 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
+use nix::libc;
+
 use super::{Format, MovingFormat};
 use crate::system::describe_error;
 
@@ -103,6 +105,9 @@ fn way_out(error: &io::Error) -> &'static str {
         }
         ErrorKind::InvalidFilename => "choose a shorter name",
         ErrorKind::BrokenPipe => "whoever read it has ended; choose a file",
+        _ if matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE)) => {
+            "raise the limit on open files (ulimit -n)"
+        }
         _ => "choose another place",
     }
 }

@@ -10,10 +10,10 @@ use std::path::{Path, PathBuf};
 
 use ::exr::meta::MetaData;
 
-use super::part::{Kind, PartFile, is_part};
+use super::part::{Kind, PartFile};
 use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
-use crate::system::file;
+use crate::system::file::{self, PART_MARK};
 
 /// Bytes at the start of a file in which its settings are: behind them are pixels.
 const START_BYTES: u64 = 4 << 20;
@@ -106,10 +106,12 @@ pub fn made(path: &Path) -> Result<Made, MadeError> {
         Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a file", kind.words()))),
         Err(error) => return Err(unreadable(describe_error(&error))),
     };
-    if is_part(path) {
+    let start = start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
+    if start.starts_with(&PART_MARK) {
+        // Do not need two descriptors at once.
+        drop(opened);
         return of_part(path).map_err(unreadable);
     }
-    let start = start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
     // A WebP file has its settings behind the pixels.
     if start.len() as u64 == START_BYTES
         && start.starts_with(b"RIFF")
