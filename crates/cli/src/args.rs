@@ -676,7 +676,7 @@ fn number_of(
 /// Error message for `--error`.
 const ERROR: &str = "expected a relative error, such as 0.02, or 0 to disable it";
 /// Error message for `--clamp`.
-const CLAMP: &str = "expected a radiance from 0 to 1e18, where 0 is no limit";
+const CLAMP: &str = "expected a radiance from 0 to 1e18 (0 disables the limit)";
 
 fn whole(text: &str, range: RangeInclusive<u32>) -> Result<u32, String> {
     let number = text.parse().ok().filter(|number| range.contains(number));

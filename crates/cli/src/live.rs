@@ -16,6 +16,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
 use crate::system::threads::start_failure;
+use crate::tui::messages::WAITING_FOR_FILE;
 use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 
 /// Time to wait at exit for an image that is being written: after a signal before giving up, after a key before telling the
@@ -23,9 +24,7 @@ use crate::tui::{self, ExitStatus, Options, TuiError, TuiOutcome};
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Line printed if glimt exits before the image is written.
-pub const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
-/// Help of the error about a missing scene in the terminal UI.
-pub const WAITING: &str = "waiting for it to appear";
+const NOT_WRITTEN: &str = "the image was not written: glimt exited first";
 
 /// Runs the terminal UI.
 pub(super) fn run(order: Order, console: &Console) -> Exit {
@@ -311,7 +310,7 @@ fn await_scene(problem: &mut Diagnostic) {
                 "waiting for the folder {} and the scene to appear{file}",
                 visible(&folder.to_string_lossy())
             ),
-            None => format!("{WAITING}{file}"),
+            None => format!("{WAITING_FOR_FILE}{file}"),
         });
     }
 }
@@ -385,7 +384,7 @@ mod tests {
             await_scene(&mut problem);
             problem.help.expect("a help text")
         };
-        assert_eq!(said("room.toml"), WAITING);
+        assert_eq!(said("room.toml"), WAITING_FOR_FILE);
         let mut renamed = *crate::scene::text_now(Path::new("none.toml")).expect_err("there is none");
         renamed.help = Some(format!("third.toml {SAME_TEXT}"));
         await_scene(&mut renamed);
@@ -393,8 +392,8 @@ mod tests {
         let name = "gone/room.toml";
         assert!(said(name).contains("/gone ") && said(name).starts_with("waiting"), "{}", said(name));
         std::fs::write(folder.path().join("rooms.toml"), "").expect("written");
-        assert!(said("room.toml").starts_with(&format!("{WAITING}; did you mean")));
+        assert!(said("room.toml").starts_with(&format!("{WAITING_FOR_FILE}; did you mean")));
         std::fs::write(folder.path().join("room.toml"), "").expect("written");
-        assert!(!said("room.toml").contains(WAITING), "other problems keep their help");
+        assert!(!said("room.toml").contains(WAITING_FOR_FILE), "other problems keep their help");
     }
 }

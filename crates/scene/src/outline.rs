@@ -138,7 +138,7 @@ fn entries(value: Value<'_>) -> Option<Entries<'_>> {
 }
 
 impl OutlineTable {
-    /// The allowed keys: those of the table's type, or of all types if it is unknown.
+    /// The allowed keys of the table's type, or of all types if it is unknown.
     pub fn known(&self) -> Vec<&'static KeyInfo> {
         match self.kind {
             None if !self.info.types.is_empty() => {

@@ -91,7 +91,7 @@ pub struct BenchArgs {
     /// Shadows in whitted: off, hard, soft
     #[arg(long, value_delimiter = ',', value_parser = one_of::<Shadows>(), hide_possible_values = true, long_help = listed::<Shadows>("Shadows, in whitted"), value_name = "LIST", help_heading = "Methods (comma-separated lists)")]
     pub shadows: Vec<Shadows>,
-    /// Limits on indirect radiance per bounce; 0 is no limit
+    /// Limits on indirect radiance per bounce; 0 disables the limit
     #[arg(long, value_delimiter = ',', value_parser = number_of("clamp", CLAMP), value_name = "LIST", allow_negative_numbers = true, help_heading = "Methods (comma-separated lists)")]
     pub clamp: Vec<f32>,
     /// Acceleration structures: bvh, bvh-high, kdtree

@@ -158,7 +158,7 @@ impl MethodRun<'_> {
         self.run.begins(&what, left);
     }
 
-    /// Expected ratio of a step's time to that of the previous step.
+    /// Expected growth of the time from one step to the next, as a factor.
     fn growth(&self, aim: StepTarget) -> f64 {
         let index = aim.index as usize;
         match &self.run.order.steps {

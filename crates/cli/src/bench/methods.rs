@@ -4,7 +4,7 @@ use crate::choice::Choice;
 use crate::pipeline::settings::Overrides;
 use crate::scene::description::{Accel, Integrator, Scene, Shadows};
 
-/// Values of each setting to measure, in all combinations. An empty list stands for the scene's value.
+/// Values of each setting to measure, in all combinations. An empty list means the scene's value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Toggles {
     /// Integrators.

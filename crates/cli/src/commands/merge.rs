@@ -323,7 +323,7 @@ impl Merge<'_> {
     }
 }
 
-/// Records the scene's path relative to the output, as a single render does. Looks for the scene next to the parts, then next to the
+/// Records the scene's path relative to the output, as a single render does. Tries its path relative to each part, then a file next to the
 /// output.
 fn name_scene(finish: &mut Finish, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };

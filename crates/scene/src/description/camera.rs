@@ -87,7 +87,7 @@ impl CameraChange {
 }
 
 impl Viewpoint {
-    /// Applies a change. If the focal plane passes through `look_at`, which is the default, it continues to do so.
+    /// Applies a change. A focal plane through `look_at`, which is the default, still passes through the changed `look_at`.
     pub fn changed(&self, change: &CameraChange) -> Self {
         let pose = change.pose.unwrap_or(self.pose);
         let focus = if self.is_focused_on_look_at() { pose.distance() } else { self.focus };

@@ -12,12 +12,12 @@ use super::context::{Context, Issue};
 pub(super) struct Names {
     /// `texture` or `material`.
     pub(super) kind: &'static str,
-    entries: Vec<Entry>,
+    entries: Vec<NameEntry>,
     indices: HashMap<String, usize>,
 }
 
 /// A defined name.
-struct Entry {
+struct NameEntry {
     name: String,
     span: Range<usize>,
     used: Cell<bool>,
@@ -25,8 +25,8 @@ struct Entry {
 
 impl Names {
     pub(super) fn new(kind: &'static str, names: impl Iterator<Item = (String, Range<usize>)>) -> Self {
-        let entries: Vec<Entry> =
-            names.map(|(name, span)| Entry { name, span, used: Cell::new(false) }).collect();
+        let entries: Vec<NameEntry> =
+            names.map(|(name, span)| NameEntry { name, span, used: Cell::new(false) }).collect();
         let indices = entries.iter().enumerate().map(|(index, entry)| (entry.name.clone(), index)).collect();
         Self { kind, entries, indices }
     }

@@ -3,7 +3,7 @@
 use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
 use crate::scene::keys::table;
 
-/// What can be completed at the cursor.
+/// Kind of completion at the cursor.
 #[derive(Debug)]
 pub(super) enum CursorContext {
     /// A header, or an empty line where one can start.
