@@ -38,5 +38,6 @@ mod show_model;
 mod stress;
 mod terminal;
 mod test_dir;
+mod threads;
 mod turntable;
 mod views;

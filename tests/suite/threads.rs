@@ -1,0 +1,68 @@
+//! Commands when the system has no thread left.
+
+use std::fs;
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::process::CommandExt;
+use std::process::{Command as Process, Stdio};
+
+use super::test_dir::{TestDir, PROGRAM};
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// A glTF file without a buffer.
+const EMPTY: &str =
+    r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"name": "a"}]}"#;
+
+/// Every command that starts threads fails with exit code 1 and a sentence. Root has no such limit, and becomes another user.
+#[test]
+#[cfg(target_os = "linux")]
+fn commands_without_threads_fail_with_a_sentence() {
+    let dir = TestDir::new();
+    dir.write("a.obj", TRIANGLE);
+    dir.write("a.gltf", EMPTY);
+    for (seed, name) in [(1, "a.exr"), (2, "b.exr")] {
+        dir.expect(&format!("ball.toml --once --progress none --seed {seed} -o {name}"), 0);
+    }
+    for part in [1, 2] {
+        dir.expect(&format!("ball.toml --once --progress none --shard {part}/2 -o {part}.part"), 0);
+    }
+    let program = dir.program();
+    let is_root = fs::metadata(dir.0.path()).expect("a folder").uid() == 0;
+    fs::set_permissions(dir.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
+    for line in [
+        "ball.toml --once -o new.png",
+        "ball.toml --once --shard 1/2 -o new.part",
+        "a.obj --once -o new.png",
+        "check ball.toml",
+        "import a.gltf -o new.toml",
+        "merge new.exr 1.part 2.part",
+        "compare a.exr b.exr",
+        "bench ball.toml --samples 1 --seeds 2 --no-cache",
+    ] {
+        let mut process = Process::new("bash");
+        process.args(["-c", &format!("ulimit -u 1 && exec \"$0\" {line}")]).arg(&program);
+        process.current_dir(dir.0.path()).stdin(Stdio::null());
+        if is_root {
+            process.uid(65534).gid(65534);
+        }
+        let output = process.output().expect("it runs");
+        let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(1), "{line}: {stderr}");
+        let errors = stderr.lines().filter(|line| line.starts_with("error: ")).count();
+        assert_eq!((errors, stderr.contains("panicked")), (1, false), "{line}: {stderr}");
+        assert!(stderr.contains("ulimit -u"), "{line}: {stderr}");
+        let is_new = |name: &str| dir.path(name).exists();
+        assert!(!["new.png", "new.part", "new.toml", "new.exr"].into_iter().any(is_new), "{line}");
+    }
+}
+
+/// A part that cannot be opened twice at once is still one.
+#[test]
+fn info_reads_parts_with_one_descriptor() {
+    let dir = TestDir::new();
+    dir.expect("ball.toml --once --progress none --shard 1/2 -o 1.part", 0);
+    let mut process = Process::new("bash");
+    process.args(["-c", "ulimit -n 4 && exec \"$0\" info 1.part", PROGRAM]).current_dir(dir.0.path());
+    let output = process.output().expect("it runs");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
