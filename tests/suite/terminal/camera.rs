@@ -1,5 +1,7 @@
 //! Moving the camera with keys, as seen on the screen and on disk.
 
+use glimt::tui::messages;
+
 use super::pty::{Colors, Folder, Terminal};
 
 /// Waits for a preview whose number of red cells satisfies `holds`.
@@ -31,7 +33,7 @@ fn moved_camera_resets_without_writing() {
         wait_for_red(&terminal, &keys, |now| if is_more { now > red + 20 } else { now + 20 < red });
         terminal.wait_for("done");
         terminal.press("0");
-        terminal.wait_for("reset to the scene's settings");
+        terminal.wait_for(messages::RESET);
         wait_for_red(&terminal, "the picture as it was", |now| now == red);
         terminal.wait_for("done");
         assert_eq!(folder.bytes("scene.png"), own, "{keys}");

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, SCENE, Terminal};
 
 const UP: &str = "\x1b[A";
@@ -102,7 +104,7 @@ fn drag_outside_the_preview_moves_nothing() {
     terminal.wait_for_render(1);
     terminal.press(&dragged((20, 1), (30, 10)));
     terminal.press("0");
-    terminal.wait_for("nothing to reset");
+    terminal.wait_for(messages::NOTHING_TO_RESET);
 }
 
 #[test]
@@ -124,7 +126,7 @@ fn reset_undoes_every_key() {
     terminal.wait_for("done");
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("0");
-    terminal.wait_for("reset to the scene's settings");
+    terminal.wait_for(messages::RESET);
     terminal.wait("the scene's own picture", |_| {
         fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own)
     });

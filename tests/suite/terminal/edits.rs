@@ -1,5 +1,7 @@
 //! Each kind of edit and the stages that it reruns, from the stage lines on the screen and from the report.
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, SCENE, Terminal};
 
 /// A triangle next to the board.
@@ -60,8 +62,8 @@ fn edits_rerun_only_dependent_stages() {
     );
 
     folder.write("scene.toml", &own.replace("[camera]", "# the eye\n\n[camera]"));
-    terminal.wait_for("unchanged · run 1");
-    terminal.wait_for("6 stages reused");
+    terminal.wait_for(&format!("unchanged · {}", messages::render(1)));
+    terminal.wait_for(&messages::cached("6 stages"));
     assert_eq!(stages(&folder, "render").0, "drrrrsrr");
 
     let edits = [
@@ -94,8 +96,8 @@ fn edits_rerun_only_dependent_stages() {
             assert!(said.contains(why), "{to}: {said}");
             // The full text, or the short one if the line has no room.
             let count = statuses.matches('r').count();
-            let words =
-                [format!("{count} reused"), format!("{count} stages reused"), "1 stage reused".to_owned()];
+            let words = [count.to_string(), format!("{count} stages"), "1 stage".to_owned()]
+                .map(|it| messages::cached(&it));
             terminal.wait("reused stages", |screen| {
                 let text = screen.contents();
                 words[..2 + usize::from(count == 1)].iter().any(|words| text.contains(words))
@@ -105,7 +107,7 @@ fn edits_rerun_only_dependent_stages() {
     folder.write("bark.ppm", &paint("50 150 100"));
     terminal.wait_for_render(renders + 1);
     terminal.wait("reused stages", |screen| {
-        ["4 stages reused", "4 reused"].iter().any(|words| screen.contents().contains(words))
+        ["4 stages", "4"].iter().any(|count| screen.contents().contains(&messages::cached(count)))
     });
     assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 kept".to_owned()));
 }
@@ -143,7 +145,7 @@ fn stages_report_their_state_while_rendering() {
 
     // Break the scene during the render, and repair it by restoring the first version.
     folder.write("scene.toml", "[render");
-    terminal.wait_for("the last good scene goes on");
+    terminal.wait_for(messages::LAST_GOOD_SCENE);
     folder.write("scene.toml", &own);
     let back = [kept, ("=", "textures", "reused"), ("=", "accel", "reused"), ("✓", "lights", " "), rendering];
     wait_for_stages(&terminal, &back);

@@ -1,5 +1,6 @@
 //! How the program ends, and the state it leaves behind.
 
+use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
 use super::pty::{Folder, SCENE};
@@ -144,7 +145,7 @@ fn render_resumes_after_a_dropped_connection() {
     // The same scene resumes, ends with the same pixels, and removes the checkpoint.
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
-    terminal.wait_for("resuming from");
+    terminal.wait_for(messages::RESUMING);
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
     terminal.wait("the checkpoint's removal", |_| !checkpoint.exists());
@@ -182,5 +183,5 @@ fn ctrl_z_without_a_shell_is_reported() {
     let mut terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.press("\x1a");
-    terminal.wait_for("no shell to go back to");
+    terminal.wait_for(messages::NO_SHELL);
 }

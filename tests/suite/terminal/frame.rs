@@ -1,5 +1,6 @@
 //! Window title, progress, notifications, links and the clipboard: which terminal gets them, and that they are reset.
 
+use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
 use super::pty::{Colors, Folder, SCENE, Terminal};
@@ -96,7 +97,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     terminal.press("y");
     terminal.wait("an answer", |screen| {
         let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
-        text.contains("copied:") || text.contains("to copy, drag with shift")
+        text.contains(messages::COPIED) || text.contains(messages::SELECT_TO_COPY)
     });
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glimt::tui::messages;
+
 use super::pty::{BLUE, Colors, Folder, GREEN, RED, SCENE, Terminal, cells, upper};
 use super::relay::Answers;
 
@@ -55,13 +57,14 @@ fn history_shows_images_and_their_changes() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
-    assert!(!terminal.text().contains("the last pictures"), "there is only one render");
+    assert!(!terminal.text().contains(messages::HISTORY), "there is only one render");
     edited(&folder, &terminal);
+    let oldest_entry = format!("1 {}", messages::OPENED);
     terminal.wait("a strip", |screen| {
         let beside = beside(screen, PANEL.into());
-        beside.contains("the last pictures n N")
+        beside.contains(&format!("{} (n / N)", messages::HISTORY))
             && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
-            && beside.contains("1 first")
+            && beside.contains(&oldest_entry)
     });
     // A thumbnail of each color, the newest at the top.
     let colors = terminal.settled(|screen| colors_from(screen, PANEL));
@@ -73,25 +76,25 @@ fn history_shows_images_and_their_changes() {
             .position(|line| line.chars().skip(PANEL.into()).collect::<String>().contains(text));
         row.unwrap_or_else(|| panic!("no {text}\n{screen}"))
     };
-    let (newest, oldest) = (row_of("▸3 mat"), row_of("1 first"));
+    let (newest, oldest) = (row_of("▸3 mat"), row_of(&oldest_entry));
     assert!(newest < oldest);
     // A click shows a render, and `n` continues from it.
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
     terminal.press(&click(oldest));
     terminal.wait("the red picture", |screen| colors_from(screen, 0)[0] > 500);
-    terminal.wait_for("picture 1 of 3");
+    terminal.wait_for(&messages::render_of(1, 3));
     terminal.wait("its mark", |screen| beside(screen, PANEL.into()).contains("▸1"));
     terminal.press("N");
-    terminal.wait_for("picture 2 of 3");
+    terminal.wait_for(&messages::render_of(2, 3));
     terminal.wait("its change", |screen| {
         words(screen).contains("after materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]")
     });
     terminal.press(&click(newest));
-    terminal.wait_for("this is the newest picture");
+    terminal.wait_for(messages::NEWEST_RENDER);
     terminal.wait("the blue picture", |screen| colors_from(screen, 0)[2] > 500);
     // A narrower window has no room for the history.
     terminal.resize(119, 40);
-    terminal.wait("no strip", |screen| !screen.contents().contains("the last pictures"));
+    terminal.wait("no strip", |screen| !screen.contents().contains(messages::HISTORY));
 }
 
 /// Several saves including a broken one count as one edit, and so do `c` and `u`.
@@ -102,8 +105,8 @@ fn history_entry_names_only_its_own_change() {
     terminal.wait_for_render(1);
     let is_told = |screen: &vt100::Screen, words: &str| {
         // The first line reports a render that left the image unchanged.
-        let beside = beside(screen, PANEL.into()).replace("unchanged · run", "run");
-        beside.contains(words) && !beside.contains("changed") && !beside.contains("rendered again")
+        let beside = beside(screen, PANEL.into()).replace("unchanged · ", "");
+        beside.contains(words) && !beside.contains("changed") && !beside.contains(messages::AGAIN)
     };
     terminal.press("+");
     terminal.wait("a moved camera", |screen| is_told(screen, "▸2 camera moved"));
@@ -126,7 +129,7 @@ fn history_is_sent_over_slow_connections() {
     let folder = Folder::new();
     let terminal = folder.thin_line(Answers::Terminal);
     edited(&folder, &terminal);
-    terminal.wait_for("the last pictures");
+    terminal.wait_for(messages::HISTORY);
     assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
 }
 
@@ -143,19 +146,19 @@ fn noise_curve_shows_its_target() {
         |cell: &vt100::Cell| cell.contents().chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
     terminal.wait("a curve", |screen| {
         let beside = beside(screen, PANEL.into());
-        beside.contains("noise while it rendered")
-            && beside.contains("the line is the 0.01 % asked of each tile")
+        beside.contains(messages::NOISE_OVER_TIME)
+            && beside.contains(&messages::noise_target("0.01 %"))
             && cells(screen).filter(|cell| is_braille(cell)).count() >= 10
     });
     // Changing the exposure does not start another render.
     terminal.press("[");
     terminal.wait_for("exposure −0.25");
     terminal.wait_for_render(1);
-    terminal.wait_for("noise while it rendered");
+    terminal.wait_for(messages::NOISE_OVER_TIME);
     terminal.press("r");
     terminal.wait_for("ETA");
     terminal
-        .wait("no curve while it renders", |screen| !screen.contents().contains("noise while it rendered"));
+        .wait("no curve while it renders", |screen| !screen.contents().contains(messages::NOISE_OVER_TIME));
 }
 
 #[test]
@@ -166,11 +169,11 @@ fn undo_reverts_only_the_kept_camera() {
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
     terminal.press("u");
-    terminal.wait_for("nothing to undo");
+    terminal.wait_for(messages::NOTHING_TO_UNDO);
     terminal.press("+");
     terminal.wait_for("camera moved (preview only)");
     terminal.press("c");
-    terminal.wait_for("camera saved to scene.toml · u: undo");
+    terminal.wait_for(&messages::camera_saved("scene.toml"));
     let kept = text();
     assert_ne!(kept, SCENE);
     // After the user has edited the file, it is kept.
@@ -187,11 +190,11 @@ fn undo_reverts_only_the_kept_camera() {
     terminal.wait("the kept camera", |screen| Colors::of(screen).is_most("red"));
     terminal.wait_for("done");
     terminal.press("u");
-    terminal.wait_for("undone: scene.toml restored");
+    terminal.wait_for(&messages::undone("scene.toml"));
     assert_eq!(text(), SCENE);
     terminal
         .wait("the picture on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
     terminal.press("u");
-    terminal.wait_for("nothing to undo");
+    terminal.wait_for(messages::NOTHING_TO_UNDO);
     assert_eq!(text(), SCENE);
 }

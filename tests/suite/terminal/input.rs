@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, SCENE};
 
 /// A key without a binding.
@@ -79,12 +81,12 @@ fn split_terminal_replies_are_not_keys() {
             pause(90);
         }
         // Each reply contains a `0`, which would show a message if it were a key.
-        assert!(!terminal.text().contains("nothing to reset"), "{answer:?}");
+        assert!(!terminal.text().contains(messages::NOTHING_TO_RESET), "{answer:?}");
     }
     terminal.press("e");
-    terminal.wait_for("no errors and no warnings");
+    terminal.wait_for(messages::NO_DIAGNOSTICS);
     terminal.press("0");
-    terminal.wait_for("nothing to reset");
+    terminal.wait_for(messages::NOTHING_TO_RESET);
     terminal.press("?");
     terminal.wait_for("show or hide this help");
     // An escape character that nothing follows is the Escape key.

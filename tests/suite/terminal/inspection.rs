@@ -3,6 +3,8 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
+use glimt::tui::messages;
+
 use super::mouse_and_editor::EDITOR;
 use super::pty::{Colors, Folder, SCENE, Terminal};
 
@@ -39,7 +41,9 @@ fn crosshair_shows_all_facts() {
     let mut terminal = terminal(&folder, &centred(), &[]);
     terminal.press("\r");
     let place = format!("scene.toml:{}", line_of_ball());
-    for words in ["sphere \"apple\"", &place, "phong ball", "3 away", "at (", "radiance (", "normal ("] {
+    for words in
+        ["sphere \"apple\"", &place, "phong ball", "distance 3", "position (", "radiance (", "normal ("]
+    {
         terminal.wait_for(words);
     }
     // The next key closes the facts; a click inspects another point, which becomes the crosshair.
@@ -59,7 +63,7 @@ fn focus_moves_to_the_crosshair_and_is_kept() {
     let folder = Folder::new();
     let mut terminal = terminal(&folder, &centred(), &[]);
     terminal.press("f");
-    terminal.wait_for("click where to focus");
+    terminal.wait_for(messages::CLICK_TO_FOCUS);
     terminal.press("f");
     terminal.wait_for("(preview only)");
     let text = terminal.text();
@@ -84,9 +88,11 @@ fn pinhole_has_no_focus() {
     let folder = Folder::new();
     let mut terminal = terminal(&folder, &centred().replace("aperture = 0.2\n", ""), &[]);
     terminal.press("ff");
-    terminal.wait_for("everything is in focus");
+    terminal.wait_for(messages::PINHOLE);
+    terminal.press("0");
+    terminal.wait_for(messages::NOTHING_TO_RESET);
     terminal.press("d");
-    terminal.wait_for("no depth of field");
+    terminal.wait_for(messages::PINHOLE);
 }
 
 #[test]
@@ -135,10 +141,10 @@ fn region_without_mouse_uses_the_crosshair() {
     assert!(!terminal.look(has_corners));
     for keys in ["zz", "mz"] {
         terminal.press(keys);
-        terminal.wait_for("the rectangle is rendered first; z ends that");
+        terminal.wait_for(messages::REGION_FIRST);
         terminal.wait("its corners", has_corners);
         terminal.press("z");
-        terminal.wait_for("no rectangle is rendered first any more");
+        terminal.wait_for(messages::REGION_CLEARED);
         terminal.wait("no corners", |screen| !has_corners(screen));
     }
 }

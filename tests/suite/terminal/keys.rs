@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, SCENE, cells, upper};
 
 const ESCAPE: &str = "\x1b";
@@ -43,11 +45,11 @@ fn settings_change_and_reset() {
     terminal.wait_for_render(renders + 1);
     terminal.press("0");
     terminal.wait_for_render(renders + 2);
-    terminal.wait_for("reset to the scene's settings");
+    terminal.wait_for(messages::RESET);
     terminal.wait_for("s soft");
     assert_eq!(folder.bytes("scene.png"), own);
     terminal.press("0");
-    terminal.wait_for("nothing to reset");
+    terminal.wait_for(messages::NOTHING_TO_RESET);
     terminal.press("r");
     terminal.wait_for_render(renders + 3);
     assert_eq!(folder.bytes("scene.png"), own);
@@ -132,7 +134,7 @@ fn paused_render_can_be_saved_and_resumed() {
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     terminal.press(" ");
-    terminal.wait_for("nothing is rendering");
+    terminal.wait_for(messages::NOT_RENDERING);
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("w");
     terminal.wait_for("wrote scene.png");
@@ -154,10 +156,10 @@ fn help_and_errors_open_scroll_and_close() {
     terminal.press(ESCAPE);
     terminal.wait("no help", gone("show or hide this help"));
     terminal.press("e");
-    terminal.wait_for("no errors and no warnings");
+    terminal.wait_for(messages::NO_DIAGNOSTICS);
 
     folder.write("scene.toml", &SCENE.replace("[0", "[\"0\"").replace("radius =", "radios ="));
-    terminal.wait_for("the last good picture stays");
+    terminal.wait_for(messages::LAST_GOOD_RENDER);
     terminal.wait_for("lines 1-");
     for (forth, back) in [(PAGE_DOWN, PAGE_UP), (DOWN, UP)] {
         terminal.press(forth);

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, SCENE, Terminal};
 
 /// The scene with `samples` samples.
@@ -72,7 +74,7 @@ fn quit_keeps_a_long_render_and_says_so() {
     assert_eq!(long.end_saying("continues"), 0);
     assert!(folder.path("scene.png.checkpoint").is_file());
     let mut again = terminal(&folder, &[]);
-    again.wait_for("resuming from");
+    again.wait_for(messages::RESUMING);
     again.press("q");
     assert_eq!(again.end_saying("continues"), 0);
     // A short render is not worth a checkpoint.

@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glimt::tui::messages;
+
 use super::pty::Folder;
 
 /// An OBJ file of a red wall of this height, one unit wide, facing the camera.
@@ -26,9 +28,9 @@ fn model_is_watched_and_kept_once() {
     assert_ne!(folder.bytes("wall.png"), low);
     assert_eq!(folder.bytes("wall.png"), once(&folder, options), "the picture of the model as it is now");
     terminal.press("o");
-    terminal.wait_for("the editor opens scenes, and this is a model");
+    terminal.wait_for(messages::NO_EDITOR_FOR_MODELS);
     terminal.press("c");
-    terminal.wait_for("wrote wall.toml, a scene of this model with this camera");
+    terminal.wait_for(&messages::model_scene("wall.toml"));
     let text = fs::read_to_string(folder.path("wall.toml")).expect("a scene");
     assert!(text.contains("[[mesh]]\nfile = \"wall.obj\"\n") && text.contains("[camera]"), "{text}");
     assert_eq!(fs::read_to_string(folder.path("wall.obj")).expect("the model"), wall(0.7));

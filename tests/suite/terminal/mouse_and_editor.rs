@@ -3,6 +3,7 @@
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
+use glimt::tui::messages;
 use nix::errno::Errno;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -40,11 +41,11 @@ fn mouse_orbits_zooms_and_inspects() {
     terminal.press("\x1b[<64;20;10M\x1b[<64;20;10M");
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 20);
     terminal.press("0");
-    terminal.wait_for("reset to the scene's settings");
+    terminal.wait_for(messages::RESET);
     terminal.press(&(press(20, 16) + &release(20, 16)));
     let line = SCENE.lines().position(|line| line == "[[quad]]").expect("a quad") + 1;
     let place = format!("scene.toml:{line}");
-    for words in ["quad", &place, "phong board", "away"] {
+    for words in ["quad", &place, "phong board", "distance"] {
         terminal.wait_for(words);
     }
     terminal.wait("the mark", |screen| screen.cell(15, 19).is_some_and(|cell| cell.contents() == "┼"));
@@ -76,7 +77,7 @@ fn kept_camera_becomes_the_scene_camera() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("c");
-    terminal.wait_for("camera unchanged: nothing to keep");
+    terminal.wait_for(messages::NOTHING_TO_KEEP);
     terminal.press(">");
     terminal.wait_for_render(2);
     terminal.press("c");
@@ -88,7 +89,7 @@ fn kept_camera_becomes_the_scene_camera() {
     // Its own write is not an edit: the stage table still shows the reused stages. A key without another effect closes
     // the message that covers it.
     terminal.press("??");
-    terminal.wait("no new render", |screen| screen.contents().contains("reused"));
+    terminal.wait("nothing rendered anew", |screen| screen.contents().contains(messages::CACHED));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
     terminal.wait_for_color("green");
 }
@@ -100,7 +101,7 @@ fn click_sets_the_focus() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("f");
-    terminal.wait_for("click where to focus");
+    terminal.wait_for(messages::CLICK_TO_FOCUS);
     terminal.press(&(press(20, 16) + &release(20, 16)));
     terminal.wait_for("focus at 4 (preview only)");
     terminal.press("ff");
@@ -250,14 +251,14 @@ fn earlier_renders_can_be_browsed() {
     terminal.wait_for_render(2);
     terminal.press("b");
     terminal.wait_for_color("red");
-    terminal.wait_for("before the last edit");
+    terminal.wait_for(messages::BEFORE_EDIT);
     terminal.press("b");
     terminal.wait_for_color("green");
     terminal.press("n");
     terminal.wait_for_color("red");
-    terminal.wait_for("picture 1 of 2");
+    terminal.wait_for(&messages::render_of(1, 2));
     terminal.press("n");
-    terminal.wait_for("this is the oldest picture");
+    terminal.wait_for(messages::OLDEST_RENDER);
     terminal.press("N");
     terminal.wait_for_color("green");
 }
@@ -288,7 +289,7 @@ fn region_first_does_not_change_the_image() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("z");
-    terminal.wait_for("drag a rectangle");
+    terminal.wait_for(messages::DRAG_REGION);
     terminal.press(&(press(5, 4) + &drag(12, 8) + &drag(20, 10)));
     let corner = |column, row, symbol: &'static str| {
         move |screen: &vt100::Screen| screen.cell(row, column).is_some_and(|cell| cell.contents() == symbol)
@@ -296,11 +297,11 @@ fn region_first_does_not_change_the_image() {
     terminal.wait("a corner", corner(4, 3, "┌"));
     terminal.wait("a corner", corner(19, 9, "┘"));
     terminal.press(&release(20, 10));
-    terminal.wait_for("first from the next render on");
+    terminal.wait_for(messages::REGION_NEXT);
     folder.write("scene.toml", &SCENE.replace(RED, GREEN).replace("samples = 4", "samples = 64"));
     terminal.wait_for_color("green");
     terminal.wait_for_render(2);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
     terminal.press("z");
-    terminal.wait_for("no rectangle is rendered first any more");
+    terminal.wait_for(messages::REGION_CLEARED);
 }

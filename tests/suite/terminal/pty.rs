@@ -9,6 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use glimt::tui::messages;
+
 use super::relay::{Answers, Relay, Seen};
 use crate::test_dir::PROGRAM;
 use nix::sys::signal::{Signal, kill};
@@ -334,7 +336,7 @@ impl Terminal {
     /// Waits until this many renders are finished and none is running.
     #[track_caller]
     pub fn wait_for_render(&self, number: usize) {
-        let words = format!("· run {number}");
+        let words = format!("· {}", messages::render(number));
         self.wait(&words, |screen| {
             let text = screen.contents();
             // Frames arrive in pieces, from the top: once the bar below the image is gone, all text is there.

@@ -1,5 +1,7 @@
 //! The whole screen in windows of all sizes: only the preview, the help, the view list, quitting.
 
+use glimt::tui::messages;
+
 use super::pty::{Colors, Folder, SCENE, Terminal};
 
 const TAB: &str = "\t";
@@ -32,8 +34,7 @@ fn tab_shows_only_the_preview() {
     let last = terminal.look(last_line);
     assert!(last.contains("✓ done") && last.ends_with("tab back"), "{last}");
     terminal.press("e");
-    terminal
-        .wait("a message in the one line", |screen| last_line(screen).contains("no errors and no warnings"));
+    terminal.wait("a message in the one line", |screen| last_line(screen).contains(messages::NO_DIAGNOSTICS));
     terminal.press(TAB);
     terminal.wait("the keys", |screen| last_line(screen).ends_with("? help"));
     assert_eq!(terminal.settled(|screen| Colors::of(screen).red), beside);
@@ -55,9 +56,9 @@ fn help_scrolls_in_small_windows() {
         terminal.wait_for("show or hide this help");
     }
     terminal.press(&PAGE_DOWN.repeat(9));
-    terminal.wait_for("the time of a stage");
+    terminal.wait_for(messages::HELP_STAGE_TIME);
     terminal.press(ESCAPE);
-    terminal.wait("no help", |screen| !screen.contents().contains("the time of a stage"));
+    terminal.wait("no help", |screen| !screen.contents().contains(messages::HELP_STAGE_TIME));
 }
 
 #[test]

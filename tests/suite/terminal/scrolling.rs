@@ -1,5 +1,7 @@
 //! Warnings, scrolling the help with the wheel, the history, and a screen that another program wrote to.
 
+use glimt::tui::messages;
+
 use super::pty::{BLUE, Folder, GREEN, RED, SCENE};
 
 #[test]
@@ -33,7 +35,7 @@ fn wheel_scrolls_only_the_help() {
     terminal.press("\x1b[<64;20;6M");
     terminal.wait_for("show or hide this help");
     terminal.press("?0");
-    terminal.wait_for("nothing to reset");
+    terminal.wait_for(messages::NOTHING_TO_RESET);
 }
 
 #[test]
@@ -42,24 +44,24 @@ fn history_ends_at_oldest_and_newest() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("b");
-    terminal.wait_for("there is no picture from before an edit");
+    terminal.wait_for(messages::NO_EARLIER_RENDER);
     for (render, (color, value)) in (2..).zip([("green", GREEN), ("blue", BLUE)]) {
         folder.write("scene.toml", &SCENE.replace(RED, value));
         terminal.wait_for_color(color);
         terminal.wait_for_render(render);
     }
     for (key, color, place) in [
-        ("n", "green", "picture 2 of 3"),
-        ("n", "red", "picture 1 of 3"),
-        ("N", "green", "picture 2 of 3"),
-        ("N", "blue", "this is the newest picture"),
+        ("n", "green", messages::render_of(2, 3)),
+        ("n", "red", messages::render_of(1, 3)),
+        ("N", "green", messages::render_of(2, 3)),
+        ("N", "blue", messages::NEWEST_RENDER.to_owned()),
     ] {
         terminal.press(key);
         terminal.wait_for_color(color);
-        terminal.wait_for(place);
+        terminal.wait_for(&place);
     }
     terminal.press("N");
-    terminal.wait_for("this is the newest picture");
+    terminal.wait_for(messages::NEWEST_RENDER);
     // `b` shows the render before the last edit, which is not the previous one in the history.
     terminal.press("n");
     terminal.wait_for_color("green");

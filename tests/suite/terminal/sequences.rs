@@ -6,6 +6,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
+use glimt::tui::messages;
 use nix::sys::signal::Signal;
 
 use super::pty::{Folder, SCENE, Terminal};
@@ -216,7 +217,7 @@ fn preview_keys_keep_the_finished_image() {
     terminal.wait_for_render(2);
     terminal.press("s");
     terminal.wait_for_render(3);
-    terminal.wait_for("not saved · w saves it");
+    terminal.wait_for(messages::NOT_SAVED);
     assert_eq!(folder.bytes("scene.png"), image);
     terminal.press("q");
     assert_eq!(terminal.code(), 0);
@@ -256,7 +257,7 @@ fn foreign_change_of_the_image_is_reported() {
     terminal.wait_for_render(1);
     let image = folder.bytes("scene.png");
     std::fs::remove_file(folder.path("scene.png")).expect("removed");
-    terminal.wait_for("scene.png was removed · w writes it again");
+    terminal.wait_for(&messages::output_changed("scene.png", "was removed"));
     terminal.press("w");
     terminal.wait_for("wrote scene.png");
     assert_eq!(folder.bytes("scene.png"), image);

@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
 use super::relay::Answers;
 
@@ -115,7 +117,9 @@ fn connection_is_measured_and_shown() {
         let text = screen.contents();
         let words: Vec<&str> = text.lines().nth_back(1)?.split_whitespace().collect();
         // The frame arrives in pieces: do not read other milliseconds of that line.
-        let &[size, "kB", "sent,", "answered", "in", time, "ms"] = words.last_chunk()? else { return None };
+        let &[size, "kB", "sent", "·", time, "ms", "round", "trip"] = words.last_chunk()? else {
+            return None;
+        };
         Some((size.parse().ok()?, time.parse().ok()?))
     }
     // A busy machine delays replies, never the opposite.
@@ -136,7 +140,7 @@ fn connection_is_measured_and_shown() {
         let (size, time) = seen.expect("bytes and time of the last preview");
         assert!((1..200).contains(&size) && time >= 150, "{size} kB, {time} ms");
         terminal.press("?");
-        terminal.wait_for("the terminal's time to answer");
+        terminal.wait_for(messages::HELP_BYTES);
         Duration::from_millis(u64::from(time))
     });
 }

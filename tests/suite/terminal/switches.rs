@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, SCENE, Terminal};
 
 /// A glass ball in front of the board, so that photons are emitted.
@@ -60,9 +62,9 @@ fn keys_ignored_by_path_are_explained() {
     terminal.wait_for_render(2);
     terminal.wait_for("s –");
     terminal.press("s");
-    terminal.wait_for("path ignores `shadows`");
+    terminal.wait_for(&messages::soft_shadows("path", "whitted"));
     terminal.press("p");
-    terminal.wait_for("path gathers no photons");
+    terminal.wait_for(&messages::no_photons("whitted"));
     terminal.wait_for_render(2);
 }
 
@@ -98,7 +100,7 @@ fn digits_choose_views_in_the_open_list() {
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "specular"]));
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.press("2e");
-    terminal.wait_for("no errors and no warnings");
+    terminal.wait_for(messages::NO_DIAGNOSTICS);
     wait_for_view(&terminal, "specular");
 }
 

@@ -1,6 +1,8 @@
 //! Saves that do not change the image, such as typos, their corrections, and comments, add no history entry and are
 //! skipped by comparisons.
 
+use glimt::tui::messages;
+
 use super::pty::{BLUE, Folder, RED, SCENE, Terminal};
 
 /// Text of the panel, without the blocks of thumbnails.
@@ -28,11 +30,11 @@ fn typo_is_not_an_edit_for_comparison() {
     terminal.wait_for_color("blue");
     terminal.wait_for_render(2);
     typo(&folder, &terminal, &blue, "radus");
-    terminal.wait_for("unchanged · run 2");
+    terminal.wait_for(&format!("unchanged · {}", messages::render(2)));
     terminal.press("b");
     terminal.wait_for_color("red");
-    terminal.wait_for("picture 1 of 2");
-    terminal.wait_for("before the last edit, materials.board.diffuse");
+    terminal.wait_for(&messages::render_of(1, 2));
+    terminal.wait_for(&format!("{}, materials.board.diffuse", messages::BEFORE_EDIT));
     terminal.press("b");
     terminal.wait_for_color("blue");
 }
@@ -54,17 +56,19 @@ fn comment_and_typo_add_no_history_entry() {
     terminal.wait("a strip", |screen| words(screen).contains("▸2 materials."));
     let commented = blue.replace("[camera]", "# the eye\n[camera]");
     folder.write("scene.toml", &commented);
-    terminal.wait_for("unchanged · run 2");
+    terminal.wait_for(&format!("unchanged · {}", messages::render(2)));
     typo(&folder, &terminal, &commented, "radus");
-    terminal.wait_for("unchanged · run 2");
+    terminal.wait_for(&format!("unchanged · {}", messages::render(2)));
     terminal.press("n");
-    terminal.wait_for("picture 1 of 2");
+    terminal.wait_for(&messages::render_of(1, 2));
     terminal.wait("two pictures", |screen| {
         let words = words(screen);
-        words.contains("▸1 first") && words.contains("2 materials.") && !words.contains("rendered again")
+        words.contains(&format!("▸1 {}", messages::OPENED))
+            && words.contains("2 materials.")
+            && !words.contains(messages::AGAIN)
     });
     terminal.press("N");
-    terminal.wait_for("this is the newest picture");
+    terminal.wait_for(messages::NEWEST_RENDER);
 }
 
 #[test]
@@ -78,15 +82,17 @@ fn typo_while_rendering_adds_one_entry() {
     let is_there = |screen: &vt100::Screen| words(screen).contains("▸2 render.");
     terminal.wait("an unfinished image", is_there);
     for _ in 0..2 {
-        typo(&folder, &terminal, &long, "the last good scene goes on");
+        typo(&folder, &terminal, &long, messages::LAST_GOOD_SCENE);
         terminal.wait_for("ETA");
     }
     terminal.wait("an unfinished image", is_there);
     terminal.press("n");
-    terminal.wait_for("picture 1 of 2");
+    terminal.wait_for(&messages::render_of(1, 2));
     terminal.wait("two pictures", |screen| {
         let words = words(screen);
         // An image that is still rendering does not count as stopped.
-        words.contains("▸1 first") && words.contains(" 2 render.") && !words.contains("unfinished")
+        words.contains(&format!("▸1 {}", messages::OPENED))
+            && words.contains(" 2 render.")
+            && !words.contains(messages::STOPPED)
     });
 }
