@@ -27,7 +27,7 @@ const END: &[u8] = b"\x1b[?2026l";
 /// Smaller slices do not flicker.
 const LARGE: usize = 2_000;
 
-/// What the environment says about the terminal and the connection to it.
+/// Properties of the terminal and the connection to it, from the environment.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TerminalLink {
     /// Runs inside tmux or screen, which answer queries themselves and delay drawing.

@@ -1,4 +1,4 @@
-//! What the environment says about the terminal and the connection to it.
+//! Detects the terminal and the connection to it from environment variables.
 
 use super::color::{ColorChoice, ColorDepth};
 use super::display::TerminalLink;

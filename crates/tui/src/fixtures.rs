@@ -134,6 +134,11 @@ impl TestUi {
         buffer
     }
 
+    /// The text on the screen, without half blocks and with single spaces.
+    pub(super) fn words(&mut self) -> String {
+        self.text().replace('▀', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
     pub(super) fn text(&mut self) -> String {
         text(&self.screen())
     }

@@ -543,14 +543,15 @@ mod tests {
         assert_eq!(record(&mut history, 3, "first", false), 2);
         assert_eq!(record(&mut history, 4, "first", false), 2);
         assert_eq!(record(&mut history, 5, "first", true), 1);
-        assert_eq!(changes(&history), ["first"]);
+        assert_eq!(changes(&history), [messages::OPENED]);
         // An edit discards the samples; the unfinished image is kept once.
         edit(&mut history);
         assert_eq!(record(&mut history, 6, "second", false), 2);
         assert_eq!(record(&mut history, 7, "second", false), 2);
         edit(&mut history);
         assert_eq!(record(&mut history, 8, "third", true), 3);
-        assert_eq!(changes(&history), ["first", "unfinished; rendered again", "rendered again"]);
+        let stopped = format!("{}; {}", messages::STOPPED, messages::AGAIN);
+        assert_eq!(changes(&history), [messages::OPENED, &stopped, messages::AGAIN]);
     }
 
     #[test]
@@ -621,7 +622,7 @@ mod tests {
         history.record(shown(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
             changes(&history),
-            ["first", "camera.fov 40 → 30", "view normal", "+ seed = 1; view reset", "rendered again",]
+            [messages::OPENED, "camera.fov 40 → 30", "view normal", "+ seed = 1; view reset", messages::AGAIN]
         );
         assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
     }
@@ -638,7 +639,7 @@ mod tests {
         history.record(shown(4, 40), Instant::now(), before);
         history.record(shown(5, 50), Instant::now(), origin("camera.fov = 40", None));
         let words = [
-            "first",
+            messages::OPENED,
             "camera moved",
             "camera.fov 40 → 30",
             "camera.fov 30 → 40; camera moved",
@@ -659,7 +660,7 @@ mod tests {
         record(&mut history, 1, "on", true, first, None);
         record(&mut history, 2, "off", true, first, Some(false));
         record(&mut history, 3, "on", true, first, Some(true));
-        let words = ["first", "photons off", "photons on"];
+        let words = [messages::OPENED, "photons off", "photons on"];
         assert_eq!(changes(&history), words);
         // The number of samples is overridden by the command line, so the image is the same.
         edit(&mut history);
@@ -709,7 +710,7 @@ mod tests {
         let keys = Toggles::default();
         record(&mut history, "narrow", keys, "camera.fov = 40");
         record(&mut history, "wide", keys, "camera.fov = 44");
-        let words = ["first", "camera.fov 40 → 44"];
+        let words = [messages::OPENED, "camera.fov 40 → 44"];
         let output = "camera.fov = 44\nrender.output = \"other.png\"";
         assert_eq!(record(&mut history, "wide", keys, output), words);
         let named = format!("{output}\nname = \"globe\"");
@@ -724,7 +725,7 @@ mod tests {
             (moved, "camera.fov = 50", "camera moved"),
             (keys, "camera.fov = 30", "camera.fov 44 → 30"),
         ] {
-            assert_eq!(record(&mut history, "moved", toggles, text), ["first", words]);
+            assert_eq!(record(&mut history, "moved", toggles, text), [messages::OPENED, words]);
         }
     }
 
@@ -739,7 +740,7 @@ mod tests {
             let origin = ImageOrigin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
             history.record(shown(number, 10 * number as u32), Instant::now(), origin);
         }
-        let words = ["first", "bricks.png changed", "rendered again", "bricks.png changed; knot.obj changed"];
+        let words = [messages::OPENED, "bricks.png changed", messages::AGAIN, "bricks.png changed; knot.obj changed"];
         assert_eq!(changes(&history), words);
     }
 

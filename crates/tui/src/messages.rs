@@ -1,5 +1,7 @@
 //! Messages and labels of the front end. Tests refer to them by name, so that rewording one breaks no test.
 
+use std::fmt::Display;
+
 /// Shown when a key needs a valid scene.
 pub const NO_SCENE: &str = "no scene loaded";
 
@@ -103,14 +105,21 @@ pub fn render_of(number: u64, count: u64) -> String {
     format!("render {number} of {count}")
 }
 
+/// Marks the number of stages that were not run again.
+pub const CACHED: &str = "cached";
 /// Number of stages that were not run again.
 pub fn cached(stages: &str) -> String {
-    format!("{stages} cached")
+    format!("{stages} {CACHED}")
 }
 
 /// Time from a save to its first changed cell.
 pub fn on_screen(time: &str) -> String {
-    format!("on screen {time} after save")
+    format!("on screen after {time}")
+}
+
+/// Number of the finished render that is shown.
+pub fn render(number: impl Display) -> String {
+    format!("render {number}")
 }
 
 /// Mark of a render that was stopped.
@@ -238,10 +247,8 @@ pub fn own_outdated(file: &str) -> String {
     format!("{file} is older than your last edit: 0 renders it")
 }
 
-/// Shown when the last valid scene is rendering while the file is broken.
-pub fn last_good_renders(percent: u32) -> String {
-    format!("rendering the last good scene: {percent} %")
-}
+/// Shown when the last valid scene is rendering while the file is broken; its progress follows.
+pub const LAST_GOOD_SCENE: &str = "rendering the last good scene";
 
 /// A hint to edit the scene.
 pub fn save_to_render(file: &str, is_again: bool) -> String {
@@ -266,3 +273,8 @@ pub const NOISE_OVER_TIME: &str = "Noise over time";
 pub fn noise_target(share: &str) -> String {
     format!("── target: {share} per tile")
 }
+
+/// Help for the time of a stage.
+pub const HELP_STAGE_TIME: &str = "stage time (difference to the last render)";
+/// Help for the cost of sending a preview.
+pub const HELP_BYTES: &str = "bytes of this render; round trip to the terminal";

@@ -16,7 +16,7 @@ use super::terminal;
 use super::terminal_replies::{BlockGlyphs, TerminalQueries, TerminalReply};
 use super::terminals::{Brand, TerminalId};
 
-/// Replies of the terminal, and what the environment says about it.
+/// Properties of the terminal, from its replies and the environment.
 #[derive(Clone, Debug)]
 pub struct Probe {
     /// Columns and rows.

@@ -290,8 +290,7 @@ pub(super) fn has_shell() -> bool {
     }
 }
 
-/// Stops the whole job with SIGTSTP, as ctrl-z does outside raw mode, so that a wrapper around glimt stops
-/// too.
+/// Stops the whole job with SIGTSTP, including a wrapper around glimt, as ctrl-z does outside raw mode.
 pub(super) fn stop_job() -> io::Result<()> {
     kill(Pid::from_raw(0), Number::SIGTSTP).map_err(io::Error::from)
 }

@@ -13,7 +13,7 @@ use crate::film::Picture;
 const MAX: usize = 240;
 /// Bits per channel of the histogram.
 const BITS: u32 = 6;
-/// A palette is kept while its RMS error is at most `WORSE` times that of a new one plus `ALLOWED` codes.
+/// A palette is kept while its RMS error is at most `WORSE` times the error of a new one plus `ALLOWED` codes.
 const WORSE: f64 = 1.2;
 const ALLOWED: f64 = 1.5;
 

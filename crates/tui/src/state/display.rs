@@ -12,7 +12,7 @@ use crate::preview_kind::PreviewKind;
 use crate::terminal_replies::TerminalQueries;
 use crate::terminals::Capabilities;
 
-/// What is known about the terminal.
+/// The window, the capabilities of the terminal, and the preview drawn in it.
 pub(crate) struct DisplayState {
     pub window: Window,
     pub kind: PreviewKind,

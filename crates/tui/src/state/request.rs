@@ -149,7 +149,7 @@ pub(crate) struct CameraStep {
     pub is_waiting: bool,
 }
 
-/// The newest request: scene, settings, and what the worker reported about them.
+/// The newest request: the scene, its settings, and the worker's replies about them.
 pub(crate) struct RequestState {
     pub scene: PathBuf,
     /// Overrides from the command line.

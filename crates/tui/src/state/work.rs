@@ -6,7 +6,7 @@ use super::request::ImageOrigin;
 use crate::noise_curve::NoiseCurve;
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
 
-/// What the worker does for the current generation.
+/// The worker's state for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activity {
     /// Working.

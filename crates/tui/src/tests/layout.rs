@@ -214,10 +214,10 @@ fn save_hint_is_shown_until_the_first_save() {
             ui.worker(done(1, Vec::new(), false));
             // With all stages, a narrow window has no room for the hint.
             ui.state.work.stages = Default::default();
-            assert!(ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
+            assert!(ui.words().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
             ui.event(Event::Changed(Changed { noticed: ui.now }));
             ui.worker(done(2, Vec::new(), false));
-            assert!(!ui.text().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
+            assert!(!ui.words().contains(&messages::save_to_render("cornell.toml", false)), "{}", ui.text());
         }
     }
 }

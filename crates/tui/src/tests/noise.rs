@@ -61,15 +61,15 @@ fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) ->
 #[test]
 fn limit_that_ended_the_render_is_shown() {
     for (error, time, complete, samples, words) in [
-        (0.02, None, true, 40, "2 % per tile ✓"),
-        (0.02, None, true, 64, "stopped at max. samples"),
+        (0.02, None, true, 40, "target ✓ 2 % per tile"),
+        (0.02, None, true, 64, "stopped at max samples"),
         (0.02, Some(5.0), false, 40, "stopped at time limit"),
         (0.0, Some(5.0), false, 40, "stopped at time limit"),
-        (0.0, Some(5.0), true, 64, "stopped at max. samples"),
+        (0.0, Some(5.0), true, 64, "stopped at max samples"),
     ] {
         let text = ended(error, time, complete, samples).split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(text.contains(words), "{words}: {text}");
-        assert_eq!(text.contains("✓ ") && text.contains("tile ✓"), words.contains("✓"), "{text}");
+        assert_eq!(text.contains("target ✓"), words.contains("✓"), "{text}");
         assert_eq!(text.contains("stopped at"), words.contains("stopped"), "{text}");
     }
     let plain = ended(0.0, None, true, 64);
@@ -81,7 +81,7 @@ fn noise_of_image_and_target_per_tile_are_shown() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     assert!(ui.text().contains("noise    0.81 %") && !ui.text().contains("per tile"), "{}", ui.text());
-    for (samples, words) in [(64, "0.5 % per tile "), (256, "0.5 % per tile ✓")] {
+    for (samples, words) in [(64, "target   0.5 % per tile"), (256, "target ✓ 0.5 % per tile")] {
         ui.state.request.effective.as_mut().expect("settings").error = 0.005;
         ui.state.request.effective.as_mut().expect("settings").samples = samples;
         assert!(ui.text().contains(words), "{words}: {}", ui.text());

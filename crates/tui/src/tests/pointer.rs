@@ -90,7 +90,7 @@ fn clicked_object_is_shown_and_edited() {
     let mut ui = ui();
     click(&mut ui, 12, 10);
     assert!(answer(&mut ui, Some(thing())).is_empty());
-    let text = ui.text();
+    let text = ui.words();
     for words in
         ["sphere \"ball\"", "cornell.toml:47", "glass crystal", "distance 3.9", "position (0.2, 0.5, -0.3)"]
     {
@@ -386,7 +386,7 @@ fn header_marks_an_older_render() {
     ui.press('y');
     let text = ui.text();
     assert!(text.contains("b newest") && text.contains("N newer"), "the keys: {text}");
-    assert!(!text.contains("samples") && !text.contains("render 1"), "of the newest render: {text}");
+    assert!(!text.contains("samples") && !text.contains("render  "), "of the newest render: {text}");
     ui.event(Event::Resize(window(30, 8)));
     assert!(first(&mut ui).contains("1 of 2"), "{}", ui.text());
     ui.event(Event::Resize(window(80, 24)));

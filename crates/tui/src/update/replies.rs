@@ -42,7 +42,7 @@ pub(super) fn handle_reply(state: &mut State, answer: TerminalReply) -> Vec<Effe
     effects
 }
 
-/// What a reply reveals about the requested pixels.
+/// Support for the requested pixel protocol, according to a reply.
 enum PixelSupport {
     Nothing,
     Has,

@@ -187,11 +187,11 @@ fn figures(state: &State) -> Vec<String> {
             at_work(state).map(|name| format!("{name}…")).into_iter().collect()
         }
         (Activity::Done, _, _) if state.work.unchanged => {
-            vec![format!("unchanged · render {}", state.work.renders), "unchanged".to_owned()]
+            vec![format!("unchanged · {}", messages::render(state.work.renders)), "unchanged".to_owned()]
         }
         (Activity::Done, Some(report), _) => {
             let time = seconds(report.seconds);
-            vec![format!("{time} · render {}", state.work.renders), time]
+            vec![format!("{time} · {}", messages::render(state.work.renders)), time]
         }
         (Activity::Waiting, _, _) => vec![messages::INCOMPLETE_FILE.to_owned()],
         (Activity::Broken, _, _) if state.overlays.is_scene_missing() => {

@@ -7,16 +7,17 @@ use ratatui::widgets::{Block, BorderType, Clear, Widget};
 use super::layout::Layout;
 use super::text::{Tone, columns, put, row, wrapped};
 use crate::keymap::{KEYMAP, OVERLAY};
+use crate::messages;
 use crate::state::State;
 
 /// Explanations of other parts of the screen.
 const NOTES: &[(&str, &str)] = &[
-    ("on screen 9 ms after save", "from a save to the first changed cell"),
-    ("31 kB sent", "bytes of this render; round trip to the terminal"),
+    ("on screen after 9 ms", "from a save to the first changed cell"),
+    ("31 kB sent", messages::HELP_BYTES),
     ("noise 2 %", "relative to the brightness of the whole image"),
     ("target 1 % per tile", "noise target per tile; ✓ reached everywhere"),
     ("bold", "changed by the last edit or a key"),
-    ("render 1 s −.3 s", "stage time (difference to the last render)"),
+    ("render 1 s −.3 s", messages::HELP_STAGE_TIME),
     ("render 3", "number of finished renders, as in the history"),
 ];
 

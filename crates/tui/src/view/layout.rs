@@ -25,7 +25,7 @@ pub(crate) struct Layout {
     pub pane: Rect,
 }
 
-/// Columns of the state block, fixed so that the name beside it does not move.
+/// Columns of the state block, fixed so that the name after it does not move.
 pub(super) const BLOCK: usize = 13;
 /// Windows with fewer rows have one line of text.
 const TWO_LINES: u16 = 6;

@@ -82,8 +82,7 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
     let words = visible(&message.words).into_owned();
-    // The list of views takes the place of a long message, and its keys that of a short one without its own
-    // line.
+    // The list of views replaces a long message, and its keys replace a short message without its own line.
     let has_place =
         !layout.under.is_empty() && matches!(spot(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {

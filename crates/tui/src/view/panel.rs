@@ -160,13 +160,13 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
         ));
         lines.extend(report.image.error.map(|error| fact("noise", share(error))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
-            let sign = if end(state) == Some(RenderEnd::Error) { " ✓" } else { "" };
-            fact("target", format!("{} % per tile{sign}", f64::from((it.error * 1e4).round()) / 100.0))
+            let label = if end(state) == Some(RenderEnd::Error) { "target ✓" } else { "target" };
+            fact(label, format!("{} % per tile", f64::from((it.error * 1e4).round()) / 100.0))
         }));
     }
     match end(state) {
         Some(RenderEnd::Time) => lines.push(fact("stopped", "at time limit".to_owned())),
-        Some(RenderEnd::Samples) => lines.push(fact("stopped", "at max. samples".to_owned())),
+        Some(RenderEnd::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
         Some(RenderEnd::Error) | None => {}
     }
     lines.extend(status_line::seen(state).map(|words| vec![(words, Tone::Faint)]));

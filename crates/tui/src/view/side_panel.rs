@@ -1,5 +1,4 @@
-//! The noise curve and the history strip, in the room that stages and results leave in the panel of a wide
-//! window.
+//! The noise curve and the history strip, in the panel of a wide window below stages and results.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;

@@ -55,7 +55,7 @@ fn content(state: &State) -> StatusContent {
         Activity::Done => StatusContent::Summary,
         Activity::Waiting | Activity::Cancelled => StatusContent::Nothing,
         Activity::Broken if let Some(progress) = last_good_progress(state) => {
-            StatusContent::Words(messages::last_good_renders(percent(progress.fraction)))
+            StatusContent::Words(format!("{}: {} %", messages::LAST_GOOD_SCENE, percent(progress.fraction)))
         }
         Activity::Broken if state.picture.shown.is_some() => {
             StatusContent::Words(messages::LAST_GOOD_RENDER.to_owned())
