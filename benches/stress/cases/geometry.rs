@@ -18,8 +18,7 @@ pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
     rows
 }
 
-/// Maximum number of nested spheres. A ray visits the boxes of all concentric spheres that it passes: the time grows
-/// with their number, and so does the reference's.
+/// Maximum number of nested spheres.
 const MOST_NESTED: u32 = 1_000_000;
 
 const LAMP: &str = "[[light]]\nposition = [1, 2, 0]\nintensity = 9\n";
