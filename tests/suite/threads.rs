@@ -5,7 +5,7 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
 use std::process::{Command as Process, Stdio};
 
-use super::test_dir::{TestDir, PROGRAM};
+use super::test_dir::{PROGRAM, TestDir};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 

@@ -622,7 +622,13 @@ mod tests {
         history.record(shown(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
             changes(&history),
-            [messages::OPENED, "camera.fov 40 → 30", "view normal", "+ seed = 1; view reset", messages::AGAIN]
+            [
+                messages::OPENED,
+                "camera.fov 40 → 30",
+                "view normal",
+                "+ seed = 1; view reset",
+                messages::AGAIN
+            ]
         );
         assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
     }
@@ -740,7 +746,8 @@ mod tests {
             let origin = ImageOrigin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
             history.record(shown(number, 10 * number as u32), Instant::now(), origin);
         }
-        let words = [messages::OPENED, "bricks.png changed", messages::AGAIN, "bricks.png changed; knot.obj changed"];
+        let words =
+            [messages::OPENED, "bricks.png changed", messages::AGAIN, "bricks.png changed; knot.obj changed"];
         assert_eq!(changes(&history), words);
     }
 

@@ -97,13 +97,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         "",
     ),
     binding(&[KeyPress::plain('y')], "y", Action::Copy, "copy the inspected values", ""),
-    binding(
-        &[KeyPress::plain('o')],
-        "o",
-        Action::Edit,
-        "open the editor at the error or clicked object",
-        "",
-    ),
+    binding(&[KeyPress::plain('o')], "o", Action::Edit, "open the editor at the error or clicked object", ""),
     binding(&[KeyPress::plain('m')], "m", Action::ToggleMouse, "mouse on or off (off to select text)", ""),
     binding(
         &[KeyPress::plain('b')],
