@@ -232,23 +232,24 @@ fn an_unfinished_image_leaves_no_older_report() {
     keys.0.done();
     assert!(report.exists());
     keys.0.edit("samples = 4", "samples = 200");
+    let narrow = |overrides: &mut Overrides| overrides.camera.fov = Some(30.0);
     let begins = |of: u64, keys: &Keys| {
         let is_begun = |event: &Event| matches!(event, Event::Progress { generation, progress } if *generation == of && progress.samples >= 2);
         while !is_begun(&keys.0.next()) {}
     };
-    let of = keys.show(|overrides| overrides.dof = Some(false));
+    let of = keys.show(narrow);
     begins(of, &keys);
     keys.0.worker.send(Command::Write);
     while !matches!(keys.0.next(), Event::Written { is_own: false, .. }) {}
     // The next request begins after the file and its report.
-    let events = keys.shown(|overrides| overrides.exposure = Some(1.0));
+    let events = keys.shown(no_shadows);
     assert!(!report.exists(), "{events:?}");
     // A file that is no report of glimt stays.
     fs::write(&report, "{}").expect("written");
-    let of = keys.show(|overrides| overrides.dof = Some(false));
+    let of = keys.show(narrow);
     begins(of, &keys);
     keys.0.worker.send(Command::Write);
-    keys.shown(|overrides| overrides.exposure = Some(2.0));
+    keys.shown(no_shadows);
     assert_eq!(fs::read_to_string(&report).expect("kept"), "{}");
 }
 
