@@ -226,7 +226,7 @@ impl Window {
     fn exact(&self, picture: &Picture) -> usize {
         let mut painter = Painter::new(ColorDepth::TrueColor);
         let (buffer, place) = self.cells(picture);
-        painter.aim(&buffer, place, Fidelity::Still);
+        painter.set_target(&buffer, place, Fidelity::Still);
         drain(&mut painter)
     }
 
@@ -236,7 +236,7 @@ impl Window {
 
     fn aim(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {
         let (buffer, place) = self.cells(picture);
-        self.painter.aim(&buffer, place, fidelity);
+        self.painter.set_target(&buffer, place, fidelity);
         drain(&mut self.painter)
     }
 

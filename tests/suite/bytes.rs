@@ -112,7 +112,7 @@ impl PaintedScreen {
                 cell.set_symbol("▀").set_fg(color(2 * y)).set_bg(color(2 * y + 1));
             }
         }
-        self.painter.aim(&buffer, place, fidelity);
+        self.painter.set_target(&buffer, place, fidelity);
         let mut sent = 0;
         loop {
             let bytes = self.painter.slice(8192);

@@ -109,18 +109,18 @@ impl Display {
 
     /// Resets screen and connection after another program has used the terminal.
     pub(super) fn restart(&mut self, now: Instant) {
-        self.forget();
+        self.invalidate();
         self.window_titles[1] = WindowTitle::default();
         self.connection = self.link.connection(now);
-        let questions = [SYNCHRONIZED, &self.link.ask.questions(), ATTRIBUTES].concat();
+        let questions = [SYNCHRONIZED, &self.link.ask.query_bytes(), ATTRIBUTES].concat();
         self.send(questions, Some(QueryKind::Attributes), now);
     }
 
     /// Marks the content of the screen as unknown.
-    pub(super) fn forget(&mut self) {
-        self.painter.forget();
+    pub(super) fn invalidate(&mut self) {
+        self.painter.invalidate();
         if let Some(images) = &mut self.images {
-            images.forget();
+            images.invalidate();
         }
         self.is_complete = false;
     }
@@ -128,7 +128,7 @@ impl Display {
     /// Switches to drawing the preview as pixels if `kind` requires it.
     pub(super) fn draw_as(&mut self, kind: PreviewKind) {
         if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
-            terminal::will_have_images();
+            terminal::record_images();
             self.images = Some(Images::new(protocol, self.link.is_in_tmux));
         }
     }
@@ -140,13 +140,13 @@ impl Display {
 
     /// Places the preview in pixels. `None` if it is drawn with cells.
     pub(super) fn place(&mut self, wanted: Option<PixelPlacement>, is_still: bool) {
-        if let Some(uncovered) = self.images.as_mut().and_then(|images| images.aim(wanted, is_still)) {
+        if let Some(uncovered) = self.images.as_mut().and_then(|images| images.set_target(wanted, is_still)) {
             self.painter.damage(uncovered);
         }
     }
 
     /// Sets a new target. `is_new` if it contains a new preview.
-    pub(super) fn aim(
+    pub(super) fn set_target(
         &mut self,
         wanted: &Buffer,
         picture: Rect,
@@ -154,9 +154,9 @@ impl Display {
         (is_new, extras): (bool, &FrameExtras),
     ) {
         if !extras.links.is_empty() {
-            terminal::will_have_links();
+            terminal::record_links();
         }
-        self.painter.aim_with(wanted, picture, fidelity, extras);
+        self.painter.set_target_with(wanted, picture, fidelity, extras);
         self.is_complete = false;
         self.is_picture_due |= is_new;
     }
@@ -172,7 +172,7 @@ impl Display {
     }
 
     /// Queues bytes to send after the preview.
-    pub(super) fn send_aside(&mut self, bytes: Vec<u8>) {
+    pub(super) fn send_after_preview(&mut self, bytes: Vec<u8>) {
         self.asides.extend(bytes);
     }
 
@@ -182,14 +182,14 @@ impl Display {
     }
 
     /// Sends everything queued to be sent after the preview.
-    fn send_more(&mut self, now: Instant) {
+    fn send_queued(&mut self, now: Instant) {
         let [wanted, sent] = &self.window_titles;
         let mut bytes = Vec::new();
         if wanted.title != sent.title {
             bytes.extend_from_slice(terminal::title_saving_bytes());
         }
         if wanted.bar.is_some() {
-            terminal::will_have_progress();
+            terminal::record_progress_bar();
         }
         bytes.extend(sent.changes(wanted));
         bytes.append(&mut self.asides);
@@ -202,12 +202,12 @@ impl Display {
     /// Sends one slice, cut short once `is_late` returns true. Returns whether anything was sent.
     pub(super) fn pump(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
         let is_idle = self.is_complete && !self.has_more();
-        let room = if is_idle { 0 } else { self.connection.room(now) };
+        let room = if is_idle { 0 } else { self.connection.max_slice(now) };
         if room == 0 {
             return false;
         }
         if self.is_complete {
-            self.send_more(now);
+            self.send_queued(now);
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
@@ -245,7 +245,7 @@ impl Display {
     }
 
     fn send_slice(&mut self, mut slice: Vec<u8>, now: Instant) {
-        let question = self.connection.question();
+        let question = self.connection.next_query();
         if question.is_some() {
             slice.extend_from_slice(STATUS);
         }
@@ -303,7 +303,7 @@ impl Display {
     pub(super) fn wake(&mut self, now: Instant) -> Option<Instant> {
         match () {
             () if self.is_complete && !self.has_more() => None,
-            () if self.connection.room(now) > 0 => Some(now),
+            () if self.connection.max_slice(now) > 0 => Some(now),
             () => self.connection.wake(now),
         }
     }
@@ -319,7 +319,7 @@ impl Display {
     }
 
     /// Time to wait for replies that would otherwise end up in the shell. `None` if none is due.
-    pub(super) fn patience(&self) -> Option<Duration> {
+    pub(super) fn reply_timeout(&self) -> Option<Duration> {
         const MIN: Duration = Duration::from_millis(200);
         const MAX: Duration = Duration::from_secs(1);
         let round_trip = self.connection.round_trip().unwrap_or_default();
@@ -352,7 +352,7 @@ mod tests {
         }
         let show = |display: &mut Display, buffer: &Buffer| {
             let before = all.get();
-            display.aim(buffer, area, Fidelity::Still, (true, &FrameExtras::default()));
+            display.set_target(buffer, area, Fidelity::Still, (true, &FrameExtras::default()));
             for second in 1..100 {
                 let (now, sent) = (now + Duration::from_millis(second), all.get());
                 display.pump(now, || false);

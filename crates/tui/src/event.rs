@@ -67,7 +67,7 @@ pub(super) enum Event {
 
 impl Event {
     /// Wraps an event of the file watcher.
-    pub(super) fn of_watcher(news: News) -> Self {
+    pub(super) fn from_watcher(news: News) -> Self {
         match news {
             News::Changed(changed) => Self::Changed(changed),
             News::Settled => Self::Settled,

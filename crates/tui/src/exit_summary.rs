@@ -132,7 +132,7 @@ fn unwritten(state: &State, failed: &WriteFailure) -> String {
 
 /// Describes an image and its render time. If its samples were reused, this is the time when they were
 /// rendered.
-pub(super) fn made(report: &Report, shown: View) -> String {
+pub(super) fn describe_image(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
     let view = view(shown);
@@ -161,7 +161,7 @@ mod tests {
     use crate::scene::diagnostic::Severity;
 
     /// A modified report of a finished request.
-    fn done_as(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
+    fn done_with(generation: u64, change: impl FnOnce(&mut Report)) -> Event {
         let Event::Done { mut report, warnings, unchanged, .. } = done(generation, Vec::new(), false) else {
             panic!("a finished request")
         };
@@ -198,7 +198,7 @@ mod tests {
             let generation = ui.state.request.generation;
             ui.worker(Event::Started { generation });
             ui.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
-            ui.worker(done_as(generation, |report| {
+            ui.worker(done_with(generation, |report| {
                 (report.seconds, report.image.render_seconds) = (seconds, rendered);
             }));
         };
@@ -219,7 +219,7 @@ mod tests {
         ui.press('v');
         let generation = ui.state.request.generation;
         ui.worker(Event::Started { generation });
-        ui.worker(done_as(generation, |report| {
+        ui.worker(done_with(generation, |report| {
             (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
             report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());

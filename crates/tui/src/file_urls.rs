@@ -13,7 +13,7 @@ pub(super) struct FileUrls {
 
 impl FileUrls {
     /// URLs of files on this machine.
-    pub(super) fn here() -> Self {
+    pub(super) fn local() -> Self {
         // Linux only: elsewhere the host name is left out.
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         Self { folder: std::env::current_dir().unwrap_or_default(), host: host.trim().to_owned() }
@@ -21,14 +21,14 @@ impl FileUrls {
 
     /// `file://host/path` (RFC 8089).
     pub(super) fn address(&self, path: &Path) -> String {
-        let mut address = format!("file://{}", quoted(self.host.as_bytes()));
-        address += &quoted(self.folder.join(path).as_os_str().as_bytes());
+        let mut address = format!("file://{}", percent_encode(self.host.as_bytes()));
+        address += &percent_encode(self.folder.join(path).as_os_str().as_bytes());
         address
     }
 }
 
 /// Percent-encodes everything but unreserved characters and slashes (RFC 3986).
-fn quoted(bytes: &[u8]) -> String {
+fn percent_encode(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len());
     for byte in bytes {
         match byte {

@@ -291,7 +291,7 @@ impl History {
     pub(super) fn step(&mut self, back: isize, newest: ShownImage) -> Option<ShownImage> {
         let at = self.open.as_ref().map_or(self.past.len().checked_sub(1)?, |(at, _)| *at);
         let next = at.checked_add_signed(-back).filter(|next| *next < self.past.len())?;
-        self.look_at(next, newest)
+        self.show_entry(next, newest)
     }
 
     /// Whether moving back by `back` entries, or forward if negative, returns to the newest one.
@@ -304,7 +304,7 @@ impl History {
     pub(super) fn open_before_edit(&mut self, newest: ShownImage) -> Option<ShownImage> {
         let last = self.past.back()?.edits;
         let at = self.past.iter().rposition(|past| past.edits < last)?;
-        self.look_at(at, newest)
+        self.show_entry(at, newest)
     }
 
     /// Number of entries.
@@ -318,14 +318,14 @@ impl History {
     }
 
     /// Index of the entry being looked at: the newest one unless an older one is open.
-    pub(super) fn looked_at(&self) -> Option<usize> {
+    pub(super) fn shown_index(&self) -> Option<usize> {
         self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
     }
 
     /// Thumbnail of an entry.
-    pub(super) fn small(&self, at: usize) -> Option<&Picture> {
+    pub(super) fn thumbnail(&self, at: usize) -> Option<&Picture> {
         let past = self.past.get(at)?;
-        Some(past.small.get_or_init(|| small(&past.shown.picture)))
+        Some(past.small.get_or_init(|| thumbnail(&past.shown.picture)))
     }
 
     /// Whether an entry belongs to this request.
@@ -348,10 +348,10 @@ impl History {
 
     /// Opens an entry.
     pub(super) fn open_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
-        self.look_at(at, newest)
+        self.show_entry(at, newest)
     }
 
-    fn look_at(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
+    fn show_entry(&mut self, at: usize, newest: ShownImage) -> Option<ShownImage> {
         let shown = self.past.get(at)?.shown.clone();
         self.open = Some((at, newest));
         Some(shown)
@@ -390,14 +390,14 @@ impl HistoryEntry {
 }
 
 /// Scales an image down to at most [`SMALL`] columns and rows.
-fn small(picture: &Picture) -> Picture {
+fn thumbnail(picture: &Picture) -> Picture {
     let scale = (SMALL / picture.width.max(picture.height).max(1) as f32).min(1.0);
     let side = |length: u32| ((length as f32 * scale).round() as u32).max(1);
     resized(picture, side(picture.width), side(picture.height))
 }
 
 /// Age in words.
-pub(super) fn ago(time: Duration) -> String {
+pub(super) fn age_in_words(time: Duration) -> String {
     match time.as_secs() {
         seconds @ ..120 => format!("{seconds} s ago"),
         seconds @ ..7200 => format!("{} min ago", seconds / 60),
@@ -414,7 +414,7 @@ mod tests {
     use crate::scene::fingerprint::Fingerprint;
     use crate::state::Toggles;
 
-    fn shown(generation: u64, side: u32) -> ShownImage {
+    fn shown_image(generation: u64, side: u32) -> ShownImage {
         ShownImage {
             generation,
             picture: plain_picture(side, side, [1, 2, 3]),
@@ -431,13 +431,13 @@ mod tests {
         for generation in 0..10 {
             let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
             history.record(
-                ShownImage { picture, ..shown(generation, 1) },
+                ShownImage { picture, ..shown_image(generation, 1) },
                 Instant::now(),
                 ImageOrigin::default(),
             );
         }
         assert_eq!(history.past.len(), 5, "3 MB per image");
-        history.record(shown(10, 10_000), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(10, 10_000), Instant::now(), ImageOrigin::default());
         assert_eq!(history.past.len(), 1, "the last one is always kept");
     }
 
@@ -448,7 +448,7 @@ mod tests {
         let mut record = |generation: u64, text: Arc<str>| {
             let picture = plain_picture(1, 1, [generation as u8, 0, 0]);
             let origin = ImageOrigin { text: Some(text), ..ImageOrigin::default() };
-            history.record(ShownImage { picture, ..shown(generation, 1) }, Instant::now(), origin);
+            history.record(ShownImage { picture, ..shown_image(generation, 1) }, Instant::now(), origin);
             history.past.len()
         };
         assert_eq!((0..8).map(|generation| record(generation, Arc::clone(&shared))).max(), Some(8));
@@ -462,7 +462,7 @@ mod tests {
         let mut history = History::default();
         for generation in 0..3 {
             history.edited();
-            history.record(shown(generation, 10), Instant::now(), ImageOrigin::default());
+            history.record(shown_image(generation, 10), Instant::now(), ImageOrigin::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
@@ -472,50 +472,50 @@ mod tests {
     fn unfinished_image_is_a_separate_entry() {
         let unfinished = ImageOrigin { is_unfinished: true, ..ImageOrigin::default() };
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
-        history.record(shown(2, 10), Instant::now(), unfinished.clone());
+        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 10), Instant::now(), unfinished.clone());
         let generations = |history: &History| -> Vec<u64> {
             history.past.iter().map(|past| past.shown.generation).collect()
         };
         assert_eq!(generations(&history), [1, 2]);
-        let better = ShownImage { picture: plain_picture(10, 10, [1, 2, 4]), ..shown(2, 10) };
+        let better = ShownImage { picture: plain_picture(10, 10, [1, 2, 4]), ..shown_image(2, 10) };
         history.record(better, Instant::now(), unfinished);
         assert_eq!(generations(&history), [1, 2]);
         // The finished image may still be equal.
-        history.record(shown(2, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 10), Instant::now(), ImageOrigin::default());
         assert_eq!(generations(&history), [2]);
     }
 
     #[test]
     fn edits_without_effect_are_skipped() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
-        history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
         // The scene is broken, then fixed.
         edit(&mut history);
         history.broken();
         edit(&mut history);
-        history.record(shown(4, 20), Instant::now(), ImageOrigin::default());
-        let before = history.open_before_edit(shown(4, 20)).expect("a picture");
+        history.record(shown_image(4, 20), Instant::now(), ImageOrigin::default());
+        let before = history.open_before_edit(shown_image(4, 20)).expect("a picture");
         assert_eq!(before.generation, 1);
         // Images changed with keys include the same edit.
         history.close();
-        history.record(shown(5, 30), Instant::now(), ImageOrigin::default());
-        let before = history.open_before_edit(shown(5, 30)).expect("a picture");
+        history.record(shown_image(5, 30), Instant::now(), ImageOrigin::default());
+        let before = history.open_before_edit(shown_image(5, 30)).expect("a picture");
         assert_eq!(before.generation, 1);
     }
 
     #[test]
     fn broken_edits_are_not_looked_back_over() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
         edit(&mut history);
-        history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
         history.edited();
         history.broken();
-        history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
-        assert_eq!(history.open_before_edit(shown(3, 30)).expect("a picture").generation, 1);
+        history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
+        assert_eq!(history.open_before_edit(shown_image(3, 30)).expect("a picture").generation, 1);
     }
 
     /// An image of which some or all samples are rendered.
@@ -524,7 +524,7 @@ mod tests {
         // No two previews are identical.
         let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
         let origin = ImageOrigin { is_unfinished: !is_finished, ..ImageOrigin::default() };
-        (ShownImage { source, picture, ..shown(generation, 10) }, origin)
+        (ShownImage { source, picture, ..shown_image(generation, 10) }, origin)
     }
 
     #[test]
@@ -580,19 +580,19 @@ mod tests {
     #[test]
     fn keeping_the_camera_counts_as_an_edit() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
-        history.record(shown(2, 20), Instant::now(), ImageOrigin::default());
-        history.record(shown(3, 30), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(2, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(3, 30), Instant::now(), ImageOrigin::default());
         history.kept_camera(2);
-        let before = history.open_before_edit(shown(3, 30)).expect("a picture");
+        let before = history.open_before_edit(shown_image(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "the previous camera");
     }
 
     #[test]
     fn one_request_has_one_entry() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), ImageOrigin::default());
-        history.record(shown(1, 20), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(1, 10), Instant::now(), ImageOrigin::default());
+        history.record(shown_image(1, 20), Instant::now(), ImageOrigin::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
     }
 
@@ -611,15 +611,15 @@ mod tests {
         let mut history = History::default();
         let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
         let seed = "camera.fov = 30\nseed = 1";
-        history.record(shown(1, 10), Instant::now(), origin(wide, None));
+        history.record(shown_image(1, 10), Instant::now(), origin(wide, None));
         // Two saves, only one of which could be read.
         history.edited();
         history.edited();
-        history.record(shown(2, 20), Instant::now(), origin(narrow, None));
-        history.record(shown(3, 30), Instant::now(), origin(narrow, Some(View::Normal)));
+        history.record(shown_image(2, 20), Instant::now(), origin(narrow, None));
+        history.record(shown_image(3, 30), Instant::now(), origin(narrow, Some(View::Normal)));
         history.edited();
-        history.record(shown(4, 40), Instant::now(), origin(seed, None));
-        history.record(shown(5, 50), Instant::now(), origin(seed, None));
+        history.record(shown_image(4, 40), Instant::now(), origin(seed, None));
+        history.record(shown_image(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
             changes(&history),
             [
@@ -630,7 +630,7 @@ mod tests {
                 messages::AGAIN
             ]
         );
-        assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
+        assert_eq!((history.len(), history.shown_index()), (5, Some(4)));
     }
 
     #[test]
@@ -638,12 +638,12 @@ mod tests {
         let mut history = History::default();
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let moved = Toggles { camera, ..Toggles::default() };
-        history.record(shown(1, 10), Instant::now(), origin("camera.fov = 40", None));
+        history.record(shown_image(1, 10), Instant::now(), origin("camera.fov = 40", None));
         let before = ImageOrigin { toggles: moved, ..origin("camera.fov = 40", None) };
-        history.record(shown(2, 20), Instant::now(), before.clone());
-        history.record(shown(3, 30), Instant::now(), origin("camera.fov = 30", None));
-        history.record(shown(4, 40), Instant::now(), before);
-        history.record(shown(5, 50), Instant::now(), origin("camera.fov = 40", None));
+        history.record(shown_image(2, 20), Instant::now(), before.clone());
+        history.record(shown_image(3, 30), Instant::now(), origin("camera.fov = 30", None));
+        history.record(shown_image(4, 40), Instant::now(), before);
+        history.record(shown_image(5, 50), Instant::now(), origin("camera.fov = 40", None));
         let words = [
             messages::OPENED,
             "camera moved",
@@ -744,7 +744,7 @@ mod tests {
         let mut history = History::default();
         for (number, (bricks, knot)) in (1..).zip([(1, 1), (2, 1), (2, 1), (3, 2)]) {
             let origin = ImageOrigin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
-            history.record(shown(number, 10 * number as u32), Instant::now(), origin);
+            history.record(shown_image(number, 10 * number as u32), Instant::now(), origin);
         }
         let words =
             [messages::OPENED, "bricks.png changed", messages::AGAIN, "bricks.png changed; knot.obj changed"];
@@ -754,18 +754,18 @@ mod tests {
     #[test]
     fn thumbnails_follow_their_images() {
         let mut history = History::default();
-        history.record(shown(1, 1000), Instant::now(), ImageOrigin::default());
-        let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
+        history.record(shown_image(1, 1000), Instant::now(), ImageOrigin::default());
+        let size = |history: &History| history.thumbnail(0).map(|small| (small.width, small.pixels[0]));
         assert_eq!(size(&history), Some((32, [1, 2, 3])));
         let picture = plain_picture(10, 10, [9, 8, 7]);
-        history.record(ShownImage { picture, ..shown(1, 1) }, Instant::now(), ImageOrigin::default());
+        history.record(ShownImage { picture, ..shown_image(1, 1) }, Instant::now(), ImageOrigin::default());
         assert_eq!(size(&history), Some((10, [9, 8, 7])));
     }
 
     #[test]
     fn ages_in_words() {
         for (seconds, words) in [(0, "0 s ago"), (119, "119 s ago"), (120, "2 min ago"), (7300, "2 h ago")] {
-            assert_eq!(ago(Duration::from_secs(seconds)), words);
+            assert_eq!(age_in_words(Duration::from_secs(seconds)), words);
         }
     }
 }

@@ -72,7 +72,7 @@ fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<
     let mut next = None;
     loop {
         match next.take().or_else(|| orders.recv().ok()) {
-            Some(Command::Render(request)) => next = pretend(&request, orders, events, slot),
+            Some(Command::Render(request)) => next = simulate_render(&request, orders, events, slot),
             Some(Command::Quit) | None => return,
             Some(_) => {}
         }
@@ -80,7 +80,7 @@ fn work(orders: &Receiver<Command>, events: &Sender<Event>, slot: &Mutex<Option<
 }
 
 /// Simulates a render of two seconds, stopped by the next command.
-fn pretend(
+fn simulate_render(
     request: &Request,
     orders: &Receiver<Command>,
     events: &Sender<Event>,

@@ -11,7 +11,7 @@ pub(super) struct NoiseCurve(Vec<(f64, f64)>);
 
 impl NoiseCurve {
     /// Records the noise after `seconds`.
-    pub(super) fn note(&mut self, seconds: f64, noise: f64) {
+    pub(super) fn record(&mut self, seconds: f64, noise: f64) {
         let is_later = self.0.last().is_none_or(|(last, _)| seconds > last * STEP);
         if !(seconds > 0.0 && seconds.is_finite() && noise > 0.0 && noise.is_finite() && is_later) {
             return;
@@ -29,7 +29,7 @@ impl NoiseCurve {
     /// Records the final noise, measured at the end of the render.
     pub(super) fn end(&mut self, seconds: f64, noise: f64) {
         self.0.retain(|(time, _)| time * STEP < seconds);
-        self.note(seconds, noise);
+        self.record(seconds, noise);
     }
 
     pub(super) fn points(&self) -> &[(f64, f64)] {
@@ -47,13 +47,13 @@ mod tests {
         for (seconds, noise) in
             [(0.0, 0.1), (0.5, f64::NAN), (0.5, 0.1), (0.505, 0.09), (1.0, 0.0), (2.0, 0.05)]
         {
-            curve.note(seconds, noise);
+            curve.record(seconds, noise);
         }
         assert_eq!(curve.points(), [(0.5, 0.1), (2.0, 0.05)]);
         curve.end(2.01, 0.04);
         assert_eq!(curve.points(), [(0.5, 0.1), (2.01, 0.04)]);
         for step in 0..2000 {
-            curve.note(2.01 * 1.03_f64.powi(step), 0.04);
+            curve.record(2.01 * 1.03_f64.powi(step), 0.04);
         }
         assert!(curve.points().len() <= MAX);
         assert!(curve.points().windows(2).all(|pair| pair[0].0 < pair[1].0));

@@ -44,13 +44,13 @@ impl PixelRequest {
             () if is_plain || is_set("STY") || term.starts_with("screen") => ImageRoute::Closed,
             () => ImageRoute::Direct,
         };
-        let terminal = TerminalId::of_environment(variable);
+        let terminal = TerminalId::from_environment(variable);
         let has_iterm = terminal.is_some_and(|terminal| terminal.brand.has_iterm_images());
         Self { protocol, route, is_known: protocol == Protocol::Iterm && has_iterm }
     }
 
     /// The query, unless it is sent anyway.
-    pub(super) fn question(self) -> Vec<u8> {
+    pub(super) fn query(self) -> Vec<u8> {
         match (self.protocol, self.route) {
             (Protocol::Kitty, ImageRoute::Direct) => KITTY_QUERY.to_vec(),
             (Protocol::Kitty, ImageRoute::Tmux) => wrapped(KITTY_QUERY),
@@ -108,12 +108,12 @@ mod tests {
     fn environment_decides_how_to_query() {
         let xterm = ("TERM", "xterm-256color");
         let direct = request(Protocol::Kitty, &[xterm], false);
-        assert_eq!((direct.route, direct.question()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
+        assert_eq!((direct.route, direct.query()), (ImageRoute::Direct, KITTY_QUERY.to_vec()));
         let tmux = request(Protocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
         assert_eq!(tmux.route, ImageRoute::Tmux);
-        assert!(tmux.question().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
+        assert!(tmux.query().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
         let screen = request(Protocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
-        assert_eq!((screen.route, screen.question()), (ImageRoute::Closed, Vec::new()));
+        assert_eq!((screen.route, screen.query()), (ImageRoute::Closed, Vec::new()));
         assert_eq!(request(Protocol::Iterm, &[xterm], true).route, ImageRoute::Closed);
         assert!(request(Protocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
         assert!(!request(Protocol::Iterm, &[xterm], false).is_known);

@@ -62,7 +62,7 @@ impl Presenter {
             display,
             drawn: DrawnPreview::default(),
             previews,
-            files: FileUrls::here(),
+            files: FileUrls::local(),
             next_frame: now,
             newest: 0,
         }
@@ -91,10 +91,10 @@ impl Presenter {
 
     /// What to do with a newer preview of the drawn request.
     fn advice(&self, state: &State, now: Instant) -> PacingAdvice {
-        advise(&self.moment(state, now))
+        advise(&self.frame_timing(state, now))
     }
 
-    fn moment(&self, state: &State, now: Instant) -> FrameTiming {
+    fn frame_timing(&self, state: &State, now: Instant) -> FrameTiming {
         let progress = state.work.progress.as_ref();
         let picture = self.drawn.picture.as_ref();
         let is_fast = self.display.is_fast();
@@ -155,13 +155,13 @@ impl Presenter {
         if let Some(title) = WindowTitle::of(state, self.display.bytes_per_second().is_some()) {
             self.display.set_title(title);
         }
-        let is_new = self.note_picture(state, now);
+        let is_new = self.record_preview(state, now);
         // The first preview stays the first until it is complete on the screen or a newer one is drawn.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::of(state).preview;
         self.display.place(view::preview::placement(state, area), is_final_preview(state));
         let extras = self.extras(state, drawn);
-        self.display.aim(&buffer, area, self.fidelity(state), (is_new, &extras));
+        self.display.set_target(&buffer, area, self.fidelity(state), (is_new, &extras));
     }
 
     /// Hyperlinks, if the terminal supports them, and text to draw after the preview.
@@ -179,7 +179,7 @@ impl Presenter {
     }
 
     /// Records the preview being drawn. Returns whether it is a new one.
-    fn note_picture(&mut self, state: &State, now: Instant) -> bool {
+    fn record_preview(&mut self, state: &State, now: Instant) -> bool {
         let Some(shown) = &state.picture.shown else { return false };
         if self.drawn.picture.as_ref().is_some_and(|drawn| Arc::ptr_eq(drawn, &shown.picture)) {
             return false;
@@ -222,7 +222,8 @@ impl Presenter {
 
     /// Time of the next action if no event arrives. `None` if there is none.
     pub(super) fn wake(&mut self, state: &State, now: Instant) -> Option<Instant> {
-        let due = self.drawn.at.filter(|_| self.drawn.is_old).and_then(|at| self.moment(state, now).due(at));
+        let due =
+            self.drawn.at.filter(|_| self.drawn.is_old).and_then(|at| self.frame_timing(state, now).due(at));
         let refine = self.has_room_to_refine(state).then_some(now);
         let due = due.into_iter().chain(refine);
         next_wake(state, self.next_frame).into_iter().chain(self.display.wake(now)).chain(due).min()

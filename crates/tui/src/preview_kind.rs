@@ -38,7 +38,7 @@ impl PreviewKind {
     }
 
     /// The kind to start with: pixels only if support is known.
-    pub(super) fn at_first(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
+    pub(super) fn initial(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
         match (Self::of(choice, depth), pixels) {
             (Self::Pixels(_), Some(request)) if !request.is_known => {
                 Self::of(PreviewChoice::HalfBlock, depth)

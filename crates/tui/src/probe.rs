@@ -58,7 +58,7 @@ impl Probe {
     /// Name of the characters that an automatic preview is drawn with.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
-        let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::of_report);
+        let terminal = name.filter(|_| !self.is_multiplexed).and_then(TerminalId::from_report);
         match (self.depth, terminal.map_or(BlockGlyphs::Unknown, BlockGlyphs::of)) {
             (ColorDepth::None, _) => "characters",
             (_, BlockGlyphs::Octants) => "octants",
@@ -91,11 +91,11 @@ pub fn probe() -> Option<Probe> {
             palette: false,
             pixels: None,
         };
-        [&ask.questions(), SYNCHRONIZED, KITTY_QUERY].concat()
+        [&ask.query_bytes(), SYNCHRONIZED, KITTY_QUERY].concat()
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { ask(&questions).ok().flatten() };
-    let brand = variable("TERM_PROGRAM").and_then(|program| Brand::of_program(&program));
+    let brand = variable("TERM_PROGRAM").and_then(|program| Brand::from_program(&program));
     Some(Probe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
@@ -124,12 +124,12 @@ fn ask(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
 fn converse(questions: &[u8]) -> io::Result<Option<ProbeReplies>> {
     let (begin, mut heard) = (Instant::now(), ReceivedReplies::default());
     send(STATUS)?;
-    if !listen(&mut heard, begin, |heard| heard.has(TerminalReply::Ready))? {
+    if !read_replies(&mut heard, begin, |heard| heard.has(TerminalReply::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
     send(&[questions, ATTRIBUTES].concat())?;
-    listen(&mut heard, Instant::now(), |heard| heard.has(TerminalReply::Attributes))?;
+    read_replies(&mut heard, Instant::now(), |heard| heard.has(TerminalReply::Attributes))?;
     Ok(Some(ProbeReplies { round_trip, ..heard.answers() }))
 }
 
@@ -140,7 +140,7 @@ fn send(bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Reads replies until `is_all` holds. Returns false on timeout.
-fn listen(
+fn read_replies(
     heard: &mut ReceivedReplies,
     begin: Instant,
     is_all: impl Fn(&ReceivedReplies) -> bool,
@@ -156,7 +156,7 @@ fn listen(
         }
         match nix::unistd::read(&stdin, &mut bytes)? {
             0 => return Ok(false),
-            count => heard.hear(&bytes[..count]),
+            count => heard.receive(&bytes[..count]),
         }
     }
     Ok(true)
@@ -172,7 +172,7 @@ struct ReceivedReplies {
 }
 
 impl ReceivedReplies {
-    fn hear(&mut self, bytes: &[u8]) {
+    fn receive(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
         let answer = |input| match input {
             DecodedInput::TerminalReply(answer) => Some(answer),
@@ -199,12 +199,12 @@ impl ReceivedReplies {
             | TerminalReply::Images(_)
             | TerminalReply::Other => None,
         };
-        let attributes = self.between(b"\x1b[?", b'c').unwrap_or_default();
+        let attributes = self.text_between(b"\x1b[?", b'c').unwrap_or_default();
         ProbeReplies {
             round_trip: Duration::ZERO,
-            name: self.between(b"\x1bP>|", 0x1b),
+            name: self.text_between(b"\x1bP>|", 0x1b),
             has_true_color: self.has(TerminalReply::TrueColor),
-            has_kitty: self.between(b"\x1b_Gi=4211;", 0x1b).is_some_and(|text| text == "OK"),
+            has_kitty: self.text_between(b"\x1b_Gi=4211;", 0x1b).is_some_and(|text| text == "OK"),
             has_sixel: attributes.split(';').any(|attribute| attribute == "4"),
             is_synchronized: self.has(TerminalReply::Synchronized { is_known: true }),
             background: self.answers.iter().find_map(background),
@@ -212,7 +212,7 @@ impl ReceivedReplies {
     }
 
     /// The first text between `begin` and `end` without an escape character.
-    fn between(&self, begin: &[u8], end: u8) -> Option<String> {
+    fn text_between(&self, begin: &[u8], end: u8) -> Option<String> {
         let starts = self.bytes.windows(begin.len()).enumerate().filter(|(_, window)| *window == begin);
         starts.into_iter().find_map(|(at, _)| {
             let rest = &self.bytes[at + begin.len()..];
@@ -226,15 +226,15 @@ impl ReceivedReplies {
 mod tests {
     use super::*;
 
-    fn heard(bytes: &[u8]) -> ReceivedReplies {
+    fn replies_in(bytes: &[u8]) -> ReceivedReplies {
         let mut heard = ReceivedReplies::default();
-        heard.hear(bytes);
+        heard.receive(bytes);
         heard
     }
 
     #[test]
     fn replies_are_found_in_any_order() {
-        let heard = heard(
+        let heard = replies_in(
             b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c",
         );
         let answers = heard.answers();
@@ -246,8 +246,9 @@ mod tests {
 
     #[test]
     fn refusals_are_not_capabilities() {
-        let refused = heard(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
+        let refused =
+            replies_in(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
         assert_eq!(refused.answers(), ProbeReplies::default());
-        assert!(!heard(b"\x1b[?62;").has(TerminalReply::Attributes));
+        assert!(!replies_in(b"\x1b[?62;").has(TerminalReply::Attributes));
     }
 }

@@ -42,9 +42,10 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
     let (sender, events) = mpsc::channel();
     let listener = Listener::start(&sender).map_err(failed("handle signals for"))?;
     let variable = |name: &str| std::env::var(name).ok();
-    let capabilities = TerminalId::of_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
+    let capabilities =
+        TerminalId::from_environment(variable).map(TerminalId::capabilities).unwrap_or_default();
     if capabilities.focus {
-        terminal::will_report_focus();
+        terminal::enable_focus_reports();
     }
     let screen = TerminalSession::open()?;
     let link =
@@ -53,7 +54,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         scene: options.scene,
         overrides: options.overrides,
         window: terminal::window(options.cell_aspect),
-        preview: PreviewKind::at_first(options.preview, depth, link.ask.pixels),
+        preview: PreviewKind::initial(options.preview, depth, link.ask.pixels),
         depth,
         is_light: color::has_light_background(variable),
         ansi: *color::ansi(&variable("TERM").unwrap_or_default()),
@@ -62,7 +63,7 @@ pub fn run(options: Options) -> Result<TuiOutcome, TuiError> {
         notify_after: options.notify_after,
     };
     forward("worker-events", options.events, &sender, Event::Worker, EventSource::Worker)?;
-    forward("news", options.news, &sender, Event::of_watcher, EventSource::Watcher)?;
+    forward("news", options.news, &sender, Event::from_watcher, EventSource::Watcher)?;
     input::start(&sender).map_err(failed("read keys from"))?;
     writer::start(&sender).map_err(failed("write to"))?;
 
@@ -165,8 +166,8 @@ impl Ui {
     /// Leaves the screen and waits briefly for outstanding replies, which a shell would take for typed text.
     fn leave(&mut self) {
         self.screen.leave();
-        let deadline = self.presenter.display.patience().map(|patience| Instant::now() + patience);
-        while let Some(deadline) = deadline.filter(|_| self.presenter.display.patience().is_some()) {
+        let deadline = self.presenter.display.reply_timeout().map(|patience| Instant::now() + patience);
+        while let Some(deadline) = deadline.filter(|_| self.presenter.display.reply_timeout().is_some()) {
             match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
                 Ok(Event::TerminalReply(answer)) => self.presenter.display.answered(answer, Instant::now()),
                 Ok(event) => self.postponed.push_back(event),
@@ -252,12 +253,12 @@ impl Ui {
             Effect::Suspend => {}
             Effect::Mouse(is_on) => self.screen.set_mouse(is_on),
             Effect::Edit(place) => return self.edit(&place),
-            Effect::Aside(bytes) => self.presenter.display.send_aside(bytes),
+            Effect::Aside(bytes) => self.presenter.display.send_after_preview(bytes),
             Effect::ReportFocus => self.screen.report_focus(),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
                 // The window may have shrunk and grown again, which cuts off its content.
-                self.presenter.display.forget();
+                self.presenter.display.invalidate();
                 return self.measure();
             }
         }
@@ -267,14 +268,14 @@ impl Ui {
     /// Leaves the terminal to the editor until it exits.
     fn edit(&mut self, place: &FilePosition) -> Option<LoopEnd> {
         self.leave();
-        input::hold(true);
+        input::set_held(true);
         self.screen.suspend();
         // While the terminal is not in raw mode, keys send signals.
         let child_signals = signals::leave_signals_to_child();
         terminal::save_modes();
         let outcome = editor::run(&editor::name(|name| std::env::var(name).ok()), place);
         terminal::restore_modes();
-        input::hold(false);
+        input::set_held(false);
         let end = self.apply(Event::Back).or_else(|| self.redraw());
         drop(child_signals);
         end.or_else(|| outcome.err().and_then(|why| self.apply(Event::NoEditor(why))))

@@ -130,7 +130,7 @@ pub(super) fn set_child(id: Option<Pid>) {
     let mut child = child();
     child.id = id;
     if let (Some(id), Some(number)) = (id, child.ending) {
-        pass_on(id, number);
+        forward_to_child(id, number);
     }
 }
 
@@ -141,13 +141,13 @@ fn end_child(number: Number) {
     if child.ending.replace(number).is_none()
         && let Some(id) = child.id
     {
-        pass_on(id, number);
+        forward_to_child(id, number);
     }
 }
 
 /// Forwards to the child or, if this process leads the job, to the whole job, since a shell does not forward
 /// signals to its children.
-fn pass_on(id: Pid, number: Number) {
+fn forward_to_child(id: Pid, number: Number) {
     let whole_job = Pid::from_raw(0);
     // Ignore errors: the process may have exited.
     let _ = kill(if getpgrp() == getpid() { whole_job } else { id }, number);
@@ -274,7 +274,7 @@ fn end_after_grace(signal: Signal, status: ExitStatus, over: &AtomicBool) {
         if over.load(Ordering::Acquire) {
             return;
         }
-        terminal::rescue();
+        terminal::restore_from_other_thread();
         thread::sleep(RESCUE);
     }
     terminal::restore_modes();

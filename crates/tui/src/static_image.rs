@@ -41,20 +41,20 @@ pub fn images_as_text(pictures: &[NamedImage], color: ColorChoice, is_terminal: 
     let depth = color::depth(color, variable);
     let shades = ColorMapper::new(depth, color::ansi(&variable("TERM").unwrap_or_default()));
     let inks = PreviewColors { depth, shades: &shades, is_light: color::has_light_background(variable) };
-    let (size, aspect) = if is_terminal { room(&terminal::window(None)) } else { ((80, 24), 2.0) };
-    let buffers = laid_out(pictures, inks, size, aspect);
+    let (size, aspect) = if is_terminal { window_size(&terminal::window(None)) } else { ((80, 24), 2.0) };
+    let buffers = lay_out(pictures, inks, size, aspect);
     buffers.iter().map(|buffer| as_text_lines(buffer, depth != ColorDepth::None)).collect()
 }
 
 /// Window size and cell aspect; some terminals report a size of 0.
-fn room(window: &Window) -> ((u16, u16), f32) {
+fn window_size(window: &Window) -> ((u16, u16), f32) {
     let size = (window.columns, window.rows);
     let aspect = Some(window.cell_aspect).filter(|aspect| aspect.is_finite());
     (if size.0 == 0 || size.1 == 0 { (80, 24) } else { size }, aspect.unwrap_or(2.0))
 }
 
 /// The images in one or more rows of text cells.
-fn laid_out(
+fn lay_out(
     pictures: &[NamedImage],
     inks: PreviewColors<'_>,
     (across, down): (u16, u16),
@@ -92,13 +92,13 @@ mod tests {
     use super::*;
     use crate::color::XTERM;
 
-    fn laid(size: (u16, u16), depth: ColorDepth) -> Vec<String> {
+    fn laid_out_lines(size: (u16, u16), depth: ColorDepth) -> Vec<String> {
         let picture = Picture { width: 64, height: 48, pixels: vec![[200, 30, 30]; 64 * 48] };
         let named = |name: &str| NamedImage { name: name.to_owned(), picture: picture.clone() };
         let shades = ColorMapper::new(depth, &XTERM);
         let inks = PreviewColors { depth, shades: &shades, is_light: false };
         let buffers =
-            laid_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
+            lay_out(&["a.png", "b.png", "a very long name of a difference"].map(named), inks, size, 2.0);
         let text: String = buffers.iter().map(|buffer| as_text_lines(buffer, false)).collect();
         text.lines().map(str::to_owned).collect()
     }
@@ -109,23 +109,23 @@ mod tests {
 
     #[test]
     fn wide_terminals_show_images_side_by_side() {
-        let lines = laid((100, 60), ColorDepth::TrueColor);
+        let lines = laid_out_lines((100, 60), ColorDepth::TrueColor);
         assert!(lines[0].starts_with("a.png ") && lines[0].contains("b.png"), "{lines:?}");
         assert_eq!((lines.len(), widest(&lines)), (1 + 12, 32 * 3 + 2 * 2), "{lines:?}");
     }
 
     #[test]
     fn narrow_terminals_stack_images_or_omit_them() {
-        let lines = laid((40, 24), ColorDepth::TrueColor);
+        let lines = laid_out_lines((40, 24), ColorDepth::TrueColor);
         assert_eq!((lines.len(), lines[8].as_str()), (3 * 8, "b.png"), "{lines:?}");
         assert!(widest(&lines) <= 40, "{lines:?}");
-        assert!(laid((29, 24), ColorDepth::TrueColor).is_empty());
-        assert!(!laid((30, 1), ColorDepth::TrueColor).is_empty());
+        assert!(laid_out_lines((29, 24), ColorDepth::TrueColor).is_empty());
+        assert!(!laid_out_lines((30, 1), ColorDepth::TrueColor).is_empty());
     }
 
     #[test]
     fn images_without_colors_are_characters() {
-        let lines = laid((100, 60), ColorDepth::None);
+        let lines = laid_out_lines((100, 60), ColorDepth::None);
         assert!(lines.len() > 8 && lines[1..].iter().all(|line| line.is_ascii()), "{lines:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Terminal setup and restoration.
 //!
 //! A [`TerminalSession`] owns the terminal. It is restored when the session is dropped, when the front end's
-//! thread panics (with a hook that is installed once), before the process stops, and with [`rescue`] when the
+//! thread panics (with a hook that is installed once), before the process stops, and with [`restore_from_other_thread`] when the
 //! front end is blocked.
 
 use std::cell::Cell;
@@ -123,7 +123,7 @@ impl TerminalSession {
 
     /// Enables focus reports.
     pub(super) fn report_focus(&mut self) {
-        will_report_focus();
+        enable_focus_reports();
         writer::send(FOCUS_ON.as_bytes().to_vec());
     }
 
@@ -187,13 +187,13 @@ fn leave_screen() {
     // Nothing else writes, so dropping the system's buffer makes room.
     let is_late = || Instant::now() >= deadline && (dropped.replace(true) || drop_kept().is_err());
     let _ = leave(&mut bytes)
-        .and_then(|()| writer::output())
+        .and_then(|()| writer::open_output())
         .and_then(|mut out| writer::write_all(&mut out, &bytes, is_late));
 }
 
 /// Restores the terminal from another thread while its owner may be blocked. Returns soon; if the terminal
 /// accepts nothing, only the spawned thread waits.
-pub(super) fn rescue() {
+pub(super) fn restore_from_other_thread() {
     if RAW.swap(false, Ordering::AcqRel) {
         let _ = disable_raw_mode();
     }
@@ -257,12 +257,12 @@ fn restore_on_abort() {
 }
 
 /// Records that kitty images may be stored and that control strings may be cut off.
-pub(super) fn will_have_images() {
+pub(super) fn record_images() {
     HAS_IMAGES.store(true, Ordering::Release);
 }
 
 /// Enables focus reports whenever the terminal is set up.
-pub(super) fn will_report_focus() {
+pub(super) fn enable_focus_reports() {
     FOCUS.store(true, Ordering::Release);
 }
 
@@ -272,12 +272,12 @@ pub(super) fn title_saving_bytes() -> &'static [u8] {
 }
 
 /// Records that a progress bar may be shown.
-pub(super) fn will_have_progress() {
+pub(super) fn record_progress_bar() {
     HAS_PROGRESS.store(true, Ordering::Release);
 }
 
 /// Records that a hyperlink may be open.
-pub(super) fn will_have_links() {
+pub(super) fn record_links() {
     HAS_LINKS.store(true, Ordering::Release);
 }
 
@@ -380,7 +380,7 @@ pub(super) fn is_there() -> bool {
 /// pixels, else 2.
 pub(super) fn window(cell_aspect: Option<f32>) -> Window {
     match terminal::window_size() {
-        Ok(size) => bounded(Window {
+        Ok(size) => limit_window(Window {
             columns: size.columns,
             rows: size.rows,
             cell_aspect: cell_aspect
@@ -389,7 +389,7 @@ pub(super) fn window(cell_aspect: Option<f32>) -> Window {
         }),
         Err(_) => {
             let (columns, rows) = terminal::size().unwrap_or((80, 24));
-            bounded(Window {
+            limit_window(Window {
                 columns,
                 rows,
                 cell_aspect: cell_aspect.unwrap_or(DEFAULT_CELL_ASPECT),
@@ -406,7 +406,7 @@ const MAX_COLUMNS: u16 = 4096;
 const MAX_CELLS: u32 = 1 << 20;
 
 /// Limits a window to the part that is drawn.
-fn bounded(window: Window) -> Window {
+fn limit_window(window: Window) -> Window {
     let columns = window.columns.min(MAX_COLUMNS);
     let most_rows = MAX_CELLS / u32::from(columns.max(1));
     let rows = u16::try_from(most_rows).map_or(window.rows, |most| window.rows.min(most));
@@ -436,7 +436,7 @@ mod tests {
     /// Serializes the tests, which share process-wide state.
     static ALONE: Mutex<()> = Mutex::new(());
 
-    fn alone() -> std::sync::MutexGuard<'static, ()> {
+    fn exclusive_access() -> std::sync::MutexGuard<'static, ()> {
         ALONE.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -448,7 +448,7 @@ mod tests {
 
     #[test]
     fn leaving_undoes_entering() {
-        let _alone = alone();
+        let _alone = exclusive_access();
         let enter = bytes(enter);
         let leave = bytes(leave);
         for mode in ["?1049", "?25", "?2004", "?1000", "?1002", "?1006"] {
@@ -461,12 +461,12 @@ mod tests {
 
     #[test]
     fn title_progress_and_links_are_undone_once() {
-        let _alone = alone();
+        let _alone = exclusive_access();
         let all = || undo_bytes().collect::<Vec<_>>();
         assert!(all().is_empty());
         assert_eq!((title_saving_bytes(), title_saving_bytes()), (KEEP_TITLE, &b""[..]));
-        will_have_progress();
-        will_have_links();
+        record_progress_bar();
+        record_links();
         assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
         assert!(all().is_empty());
         assert_eq!(title_saving_bytes(), KEEP_TITLE, "saved again when set again");
@@ -475,7 +475,7 @@ mod tests {
 
     #[test]
     fn vt100_screen_is_restored() {
-        let _alone = alone();
+        let _alone = exclusive_access();
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let mut screen = vt100::Parser::new(side(5), side(20), 0);
         screen.process(b"shell$ ");
@@ -500,7 +500,7 @@ mod tests {
     fn number_of_cells_is_bounded() {
         let of = |columns, rows| {
             let cell_pixels = DEFAULT_CELL_PIXELS;
-            let drawn = bounded(Window { columns, rows, cell_aspect: DEFAULT_CELL_ASPECT, cell_pixels });
+            let drawn = limit_window(Window { columns, rows, cell_aspect: DEFAULT_CELL_ASPECT, cell_pixels });
             (drawn.columns, drawn.rows)
         };
         for usual in [(80, 24), (640, 360), (4096, 256), (0, 0), (0, 24), (1, u16::MAX)] {
@@ -522,10 +522,10 @@ mod tests {
 
     #[test]
     fn restoring_an_unused_terminal_does_nothing() {
-        let _alone = alone();
+        let _alone = exclusive_access();
         assert!(!TAKEN.load(Ordering::Acquire));
         restore();
-        rescue();
+        restore_from_other_thread();
         assert!(!TAKEN.load(Ordering::Acquire));
     }
 }

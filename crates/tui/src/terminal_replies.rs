@@ -83,14 +83,14 @@ pub(super) struct TerminalQueries {
 
 impl TerminalQueries {
     /// The bytes of the queries.
-    pub(super) fn questions(self) -> Vec<u8> {
-        let mut questions = Vec::new();
+    pub(super) fn query_bytes(self) -> Vec<u8> {
+        let mut queries = Vec::new();
         let mut ask = |is_asked: bool, bytes: &[u8]| {
             if is_asked {
-                questions.extend_from_slice(bytes);
+                queries.extend_from_slice(bytes);
             }
         };
-        let pixels = self.pixels.map(PixelRequest::question).unwrap_or_default();
+        let pixels = self.pixels.map(PixelRequest::query).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
         ask(true, &pixels);
         // `RGB` and `Tc` in hexadecimal.
@@ -99,7 +99,7 @@ impl TerminalQueries {
         for index in 0..16 {
             ask(self.palette, format!("\x1b]4;{index};?\x1b\\").as_bytes());
         }
-        questions
+        queries
     }
 }
 
@@ -109,14 +109,14 @@ mod tests {
 
     #[test]
     fn only_useful_queries_are_sent() {
-        assert!(TerminalQueries::default().questions().is_empty());
+        assert!(TerminalQueries::default().query_bytes().is_empty());
         for ask in [
             TerminalQueries { blocks: true, ..TerminalQueries::default() },
             TerminalQueries { name: true, blocks: true, ..TerminalQueries::default() },
         ] {
-            assert_eq!(ask.questions(), b"\x1b[>q");
+            assert_eq!(ask.query_bytes(), b"\x1b[>q");
         }
-        let palette = TerminalQueries { palette: true, ..TerminalQueries::default() }.questions();
+        let palette = TerminalQueries { palette: true, ..TerminalQueries::default() }.query_bytes();
         assert!(palette.ends_with(b"\x1b]4;15;?\x1b\\"));
     }
 
@@ -137,7 +137,7 @@ mod tests {
             ("XTerm(390)", BlockGlyphs::Unknown),
             ("", BlockGlyphs::Unknown),
         ] {
-            let found = TerminalId::of_report(report).map_or(BlockGlyphs::Unknown, BlockGlyphs::of);
+            let found = TerminalId::from_report(report).map_or(BlockGlyphs::Unknown, BlockGlyphs::of);
             assert_eq!(found, blocks, "{report}");
         }
     }

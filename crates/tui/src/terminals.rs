@@ -60,7 +60,7 @@ pub(super) struct Capabilities {
 
 impl Brand {
     /// The terminal with this `TERM_PROGRAM`. `None` if unknown.
-    pub(super) fn of_program(name: &str) -> Option<Self> {
+    pub(super) fn from_program(name: &str) -> Option<Self> {
         const PROGRAMS: [(&str, Brand); 6] = [
             ("ghostty", Brand::Ghostty),
             ("WezTerm", Brand::WezTerm),
@@ -112,7 +112,7 @@ impl Brand {
 
 impl TerminalId {
     /// Parses an XTVERSION report such as `foot(1.20.2)` or `ghostty 1.2.0`.
-    pub(super) fn of_report(report: &str) -> Option<Self> {
+    pub(super) fn from_report(report: &str) -> Option<Self> {
         const NAMES: [(&str, Brand); 10] = [
             ("kitty", Brand::Kitty),
             ("foot", Brand::Foot),
@@ -132,7 +132,7 @@ impl TerminalId {
 
     /// Detects the terminal from environment variables. `None` if unknown, and inside tmux and screen, which
     /// do not pass on the sequences.
-    pub(super) fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
+    pub(super) fn from_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
         const TERMS: [(&str, Brand); 6] = [
             ("xterm-kitty", Brand::Kitty),
             ("foot", Brand::Foot),
@@ -149,7 +149,7 @@ impl TerminalId {
         }
         let known = |brand: Brand, number: &str| Some(Self { brand, version: version(&get(number)) });
         // Terminals that run inside another one overwrite these two variables.
-        if let Some(brand) = Brand::of_program(&get("TERM_PROGRAM")) {
+        if let Some(brand) = Brand::from_program(&get("TERM_PROGRAM")) {
             return known(brand, "TERM_PROGRAM_VERSION");
         }
         if let Some((_, brand)) = TERMS.iter().find(|(name, _)| term.starts_with(name)) {
@@ -234,8 +234,8 @@ fn version(text: &str) -> [u32; 2] {
 mod tests {
     use super::*;
 
-    fn found(pairs: &[(&str, &str)]) -> Option<TerminalId> {
-        TerminalId::of_environment(|name| {
+    fn identify(pairs: &[(&str, &str)]) -> Option<TerminalId> {
+        TerminalId::from_environment(|name| {
             pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
         })
     }
@@ -263,7 +263,7 @@ mod tests {
             // VS Code started from kitty.
             (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
         ] {
-            assert_eq!(found(pairs), Some(TerminalId { brand, version }), "{pairs:?}");
+            assert_eq!(identify(pairs), Some(TerminalId { brand, version }), "{pairs:?}");
         }
     }
 
@@ -280,9 +280,9 @@ mod tests {
             &[("TERM", "xterm-256color"), wezterm, ("TMUX", "/tmp/tmux-0/default,1,0")],
             &[("TERM", "tmux-256color"), ("VTE_VERSION", "8002")],
         ] {
-            assert_eq!(found(pairs), None, "{pairs:?}");
+            assert_eq!(identify(pairs), None, "{pairs:?}");
         }
-        assert_eq!(TerminalId::of_report("tmux 3.4"), None);
+        assert_eq!(TerminalId::from_report("tmux 3.4"), None);
     }
 
     #[test]
@@ -299,7 +299,7 @@ mod tests {
             ("kitty(0.40.1)", false),
             ("XTerm(390)", false),
         ] {
-            let terminal = TerminalId::of_report(report).expect(report);
+            let terminal = TerminalId::from_report(report).expect(report);
             assert_eq!(terminal.capabilities().progress, has_progress, "{report}");
         }
     }

@@ -59,7 +59,7 @@ impl WindowTitle {
     /// not change.
     pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
         let capabilities = state.display.capabilities;
-        if state.work.running_for(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
+        if state.work.running_time(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {
             return None;
         }
         let progress = state.work.progress.as_ref().filter(|_| state.work.is_running());

@@ -63,7 +63,7 @@ impl WriteQueue {
 /// The system has no thread or file descriptor left.
 pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
     let events = events.clone();
-    let mut out = output()?;
+    let mut out = open_output()?;
     let write = move || {
         loop {
             let slice = QUEUE.take();
@@ -84,7 +84,7 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
 
 /// Opens the terminal of standard output without a buffer and without a lock that a stalled writer could
 /// hold. It is nonblocking, which does not affect other users of the terminal.
-pub(super) fn output() -> io::Result<File> {
+pub(super) fn open_output() -> io::Result<File> {
     let stdout = io::stdout();
     let terminal = ttyname(stdout.as_fd()).map_err(io::Error::from).and_then(|name| {
         let flags = OFlag::O_NONBLOCK | OFlag::O_NOCTTY;

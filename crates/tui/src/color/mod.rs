@@ -89,7 +89,7 @@ fn is_true_color(term: &str, program: &str) -> bool {
     // Inside tmux, TERM_PROGRAM is `tmux`, so the outer terminal's capabilities do not leak in.
     term.ends_with("-direct")
         || TERMS.iter().any(|name| term.contains(name))
-        || Brand::of_program(program).is_some_and(Brand::has_colors_and_repeats)
+        || Brand::from_program(program).is_some_and(Brand::has_colors_and_repeats)
 }
 
 /// Whether `COLORFGBG` (set by rxvt and some others) indicates a light background.

@@ -29,7 +29,7 @@ impl TokenBucket {
     }
 
     /// Time at which there are enough tokens for `bytes`.
-    pub(super) fn when(&self, bytes: usize, now: Instant) -> Instant {
+    pub(super) fn available_at(&self, bytes: usize, now: Instant) -> Instant {
         if self.tokens(now) >= bytes {
             return now;
         }

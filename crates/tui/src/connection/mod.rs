@@ -113,7 +113,7 @@ impl Connection {
     }
 
     /// Maximum size of the next slice without its query; 0 if it has to wait.
-    pub(super) fn room(&mut self, now: Instant) -> usize {
+    pub(super) fn max_slice(&mut self, now: Instant) -> usize {
         self.check_timeouts(now);
         let window = self.window_bytes().saturating_sub(self.in_flight);
         let tokens = self.bucket.tokens(now);
@@ -131,7 +131,7 @@ impl Connection {
     }
 
     /// The query to append to the next slice.
-    pub(super) fn question(&self) -> Option<QueryKind> {
+    pub(super) fn next_query(&self) -> Option<QueryKind> {
         (self.replies != ReplyState::Silent).then_some(QueryKind::Status)
     }
 
@@ -175,7 +175,7 @@ impl Connection {
 
     /// Time at which there may be room even without a reply.
     pub(super) fn wake(&self, now: Instant) -> Option<Instant> {
-        let filled = self.bucket.when(MIN_SLICE + QUERY_BYTES, now);
+        let filled = self.bucket.available_at(MIN_SLICE + QUERY_BYTES, now);
         match self.replies {
             ReplyState::Answering => {
                 let lost = (!self.flight.is_empty()).then_some(self.heard + self.silence());
@@ -195,7 +195,7 @@ impl Connection {
 
     /// Round-trip time of an idle connection. `None` if the terminal does not reply.
     pub(super) fn round_trip(&self) -> Option<Duration> {
-        self.round_trips.least().filter(|_| self.replies == ReplyState::Answering)
+        self.round_trips.minimum().filter(|_| self.replies == ReplyState::Answering)
     }
 
     /// Estimated bandwidth in bytes per second. `None` if it is too high to matter.
@@ -203,7 +203,7 @@ impl Connection {
         /// Previews take no noticeable time at this rate.
         const FAST: f64 = 2e6;
         let window_rate = || {
-            let round_trip = self.round_trips.least()?.as_secs_f64();
+            let round_trip = self.round_trips.minimum()?.as_secs_f64();
             Some(self.window / round_trip.max(1e-6))
         };
         let rate = match self.replies {
@@ -236,11 +236,11 @@ impl Connection {
         match self.replies {
             ReplyState::Asked { until } if now >= until => {
                 self.replies = ReplyState::Silent;
-                self.forget_flight();
+                self.clear_in_flight();
             }
             ReplyState::Answering if self.awaits_reply() && now >= self.heard + self.silence() => {
                 // The connection is stalled or a reply was lost. Send little until one arrives.
-                self.forget_flight();
+                self.clear_in_flight();
                 self.window = MIN_WINDOW;
             }
             ReplyState::Asked { .. } | ReplyState::Answering | ReplyState::Silent => {}
@@ -249,17 +249,17 @@ impl Connection {
 
     /// Time after which missing replies count as lost.
     fn silence(&self) -> Duration {
-        SILENCE.max(self.round_trips.least().unwrap_or_default() * SILENCE_ROUND_TRIPS)
+        SILENCE.max(self.round_trips.minimum().unwrap_or_default() * SILENCE_ROUND_TRIPS)
     }
 
-    fn forget_flight(&mut self) {
+    fn clear_in_flight(&mut self) {
         self.flight.clear();
         self.in_flight = 0;
     }
 
     /// Adjusts the window to the queueing delay of a slice.
     fn adjust_window(&mut self, slice: &SentSlice, round_trip: Duration, now: Instant) {
-        let Some(least) = self.round_trips.least() else { return };
+        let Some(least) = self.round_trips.minimum() else { return };
         let queue = round_trip.saturating_sub(least);
         if queue <= MAX_QUEUE {
             if slice.is_limited {
@@ -294,7 +294,7 @@ impl RoundTrips {
         };
     }
 
-    fn least(&self) -> Option<Duration> {
+    fn minimum(&self) -> Option<Duration> {
         let current = self.current.map(|(_, least)| least);
         current.into_iter().chain(self.before).min()
     }

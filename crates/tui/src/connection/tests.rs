@@ -64,11 +64,11 @@ impl SimulatedTerminal {
                 self.connection.answered(question, self.now);
             }
             loop {
-                let room = self.connection.room(self.now);
+                let room = self.connection.max_slice(self.now);
                 if room == 0 {
                     break;
                 }
-                let question = self.connection.question();
+                let question = self.connection.next_query();
                 self.send(room + question.map_or(0, |_| QUERY_BYTES), question);
             }
             let next = [self.due.front().map(|(when, _)| *when), self.connection.wake(self.now)];
@@ -78,7 +78,7 @@ impl SimulatedTerminal {
     }
 
     /// Fraction of the bandwidth that was used in the last run.
-    fn share(&self, milliseconds: u64) -> f64 {
+    fn bandwidth_share(&self, milliseconds: u64) -> f64 {
         self.carried as f64 / (self.bytes_a_second * milliseconds as f64 / 1e3)
     }
 }
@@ -97,7 +97,11 @@ fn connections_are_filled_with_short_queues() {
         let longest = MAX_QUEUE.as_secs_f64() * 2.0 + MIN_WINDOW / bytes_a_second;
         assert!(terminal.longest.as_secs_f64() <= longest, "{name}: {:?}", terminal.longest);
         let most = MAX_WINDOW as f64 / (bytes_a_second * milliseconds as f64 / 1e3);
-        assert!(terminal.share(10_000) >= 0.6 * most.min(1.0), "{name}: {}", terminal.share(10_000));
+        assert!(
+            terminal.bandwidth_share(10_000) >= 0.6 * most.min(1.0),
+            "{name}: {}",
+            terminal.bandwidth_share(10_000)
+        );
         let measured = terminal.connection.round_trip().expect("a reply").as_millis();
         assert!(measured >= u128::from(milliseconds), "{name}: {measured}");
     }
@@ -112,10 +116,10 @@ fn silent_terminals_are_paced_by_time() {
     assert!(
         !terminal.connection.awaits_reply()
             && terminal.connection.round_trip().is_none()
-            && terminal.connection.question().is_none()
+            && terminal.connection.next_query().is_none()
     );
     assert!(terminal.longest <= Duration::from_millis(140), "{:?}", terminal.longest);
-    assert!(terminal.share(10_000) > 0.7, "{}", terminal.share(10_000));
+    assert!(terminal.bandwidth_share(10_000) > 0.7, "{}", terminal.bandwidth_share(10_000));
 }
 
 #[test]
@@ -132,7 +136,7 @@ fn multiplexed_terminals_are_paced_by_time() {
     let mut terminal = SimulatedTerminal::new(125e3, 150, true, true);
     terminal.run(10_000);
     assert!(terminal.longest <= Duration::from_millis(140), "{:?}", terminal.longest);
-    assert!(terminal.share(10_000) > 0.7, "{}", terminal.share(10_000));
+    assert!(terminal.bandwidth_share(10_000) > 0.7, "{}", terminal.bandwidth_share(10_000));
 }
 
 #[test]
@@ -146,7 +150,7 @@ fn stalled_connection_gets_little_and_recovers() {
     assert!(terminal.carried <= MAX_WINDOW + 8 * MIN_WINDOW as usize, "{}", terminal.carried);
     terminal.answers = true;
     terminal.run(10_000);
-    assert!(terminal.share(10_000) > 0.6, "{}", terminal.share(10_000));
+    assert!(terminal.bandwidth_share(10_000) > 0.6, "{}", terminal.bandwidth_share(10_000));
 }
 
 #[test]
@@ -157,16 +161,16 @@ fn lost_reply_delays_the_screen_by_a_second() {
     connection.answered(QueryKind::Attributes, now + Duration::from_millis(5));
     let sent = now + Duration::from_millis(100);
     connection.send(connection.window_bytes(), Some(QueryKind::Status), sent);
-    assert_eq!(connection.room(sent + Duration::from_millis(900)), 0);
+    assert_eq!(connection.max_slice(sent + Duration::from_millis(900)), 0);
     assert_eq!(connection.wake(sent), Some(sent + SILENCE));
-    assert!(connection.room(sent + SILENCE) > 0);
+    assert!(connection.max_slice(sent + SILENCE) > 0);
     // With long round trips, the timeout is longer.
     let mut slow = Connection::new(false, now);
     slow.send(100, Some(QueryKind::Attributes), now);
     slow.answered(QueryKind::Attributes, now + Duration::from_millis(800));
     slow.send(slow.window_bytes(), Some(QueryKind::Status), sent);
-    assert_eq!(slow.room(sent + Duration::from_secs(3)), 0);
-    assert!(slow.room(sent + Duration::from_millis(3200)) > 0);
+    assert_eq!(slow.max_slice(sent + Duration::from_secs(3)), 0);
+    assert!(slow.max_slice(sent + Duration::from_millis(3200)) > 0);
 }
 
 #[test]

@@ -97,7 +97,7 @@ impl Images {
 
     /// Sets the image to show; `is_still` if it is final. Returns the cells that an image no longer covers
     /// and that must be redrawn.
-    pub(super) fn aim(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
+    pub(super) fn set_target(&mut self, wanted: Option<PixelPlacement>, is_still: bool) -> Option<Rect> {
         (self.wanted, self.is_still) = (wanted, is_still);
         let shown = self.shown.as_ref()?.cells;
         if self.wanted.as_ref().is_some_and(|wanted| wanted.cells == shown) {
@@ -105,14 +105,14 @@ impl Images {
         }
         self.shown = None;
         match self.protocol {
-            Protocol::Kitty => self.pieces.push_back(self.passed(kitty::delete_all())),
+            Protocol::Kitty => self.pieces.push_back(self.wrap_for_tmux(kitty::delete_all())),
             Protocol::Sixel | Protocol::Iterm => {}
         }
         Some(shown)
     }
 
     /// Records that the screen has been cleared.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn invalidate(&mut self) {
         self.shown = None;
     }
 
@@ -160,19 +160,19 @@ impl Images {
         };
         let last = bodies.len().saturating_sub(1);
         for (i, body) in bodies.into_iter().enumerate() {
-            let piece = if i == last { self.placed(wanted.cells, body) } else { self.passed(body) };
+            let piece = if i == last { self.at_cell(wanted.cells, body) } else { self.wrap_for_tmux(body) };
             self.pieces.push_back(piece);
         }
         self.shown = Some(wanted);
     }
 
     /// Positions the cursor at the top left cell and restores it afterwards.
-    fn placed(&self, cells: Rect, body: Vec<u8>) -> Vec<u8> {
+    fn at_cell(&self, cells: Rect, body: Vec<u8>) -> Vec<u8> {
         let mut bytes = format!("\x1b7\x1b[{};{}H", cells.y + 1, cells.x + 1).into_bytes();
         if self.is_wrapped {
             // tmux moves the real cursor when it draws, so print a blank there and step back.
             bytes.extend_from_slice(b"\x1b[0m ");
-            bytes.extend(self.passed([b"\x1b[D".to_vec(), body].concat()));
+            bytes.extend(self.wrap_for_tmux([b"\x1b[D".to_vec(), body].concat()));
         } else {
             bytes.extend(body);
         }
@@ -180,7 +180,7 @@ impl Images {
         bytes
     }
 
-    fn passed(&self, body: Vec<u8>) -> Vec<u8> {
+    fn wrap_for_tmux(&self, body: Vec<u8>) -> Vec<u8> {
         if self.is_wrapped { wrapped(&body) } else { body }
     }
 }

@@ -28,7 +28,7 @@ impl Palette {
     /// The palette for an image: the previous one if it still fits.
     pub(super) fn for_picture(picture: &Picture, before: Option<Self>) -> Self {
         let mut bins = bins(picture);
-        let colors = split(&mut bins);
+        let colors = split_bins(&mut bins);
         let fits = |palette: &Self| error(&bins, &palette.colors) <= WORSE * error(&bins, &colors) + ALLOWED;
         before.filter(fits).unwrap_or_else(|| Self { dither: PaletteDither::new(&colors), colors })
     }
@@ -103,7 +103,7 @@ impl ColorBox {
 }
 
 /// Splits the worst box until there are enough or all are exact. Returns the mean colors of the boxes.
-fn split(bins: &mut [Bin]) -> Vec<[u8; 3]> {
+fn split_bins(bins: &mut [Bin]) -> Vec<[u8; 3]> {
     let mut boxes = vec![ColorBox::of(bins, 0..bins.len())];
     while boxes.len() < MAX {
         let worst = (0..boxes.len()).max_by(|a, b| boxes[*a].error.total_cmp(&boxes[*b].error));

@@ -21,31 +21,31 @@ fn pending_images_are_replaced_by_the_newest() {
     let mut images = Images::new(Protocol::Kitty, false);
     assert!(images.is_complete() && images.slice(5000, None).is_none());
     let (first, second, third) = (placement(1, 2), placement(2, 2), placement(3, 2));
-    images.aim(Some(first), false);
+    images.set_target(Some(first), false);
     let begin = String::from_utf8(images.slice(100, None).expect("a piece")).expect("ASCII");
     assert!(begin.starts_with("\x1b_Ga=T,f=100,i=6777961,p=1,c=8,r=3,C=1,q=2,m=1;"), "{begin}");
     // More images arrive while it is being sent; only the last one follows.
-    images.aim(Some(second), false);
-    images.aim(Some(third.clone()), true);
+    images.set_target(Some(second), false);
+    images.set_target(Some(third.clone()), true);
     let rest = all(&mut images);
     assert_eq!(rest.matches("a=T").count(), 1);
     assert_eq!(rest.matches("\x1b7\x1b[2;3H").count(), 2, "the last chunk of each shows it");
     assert!(images.is_complete());
-    images.aim(Some(third), true);
+    images.set_target(Some(third), true);
     assert_eq!(all(&mut images), "");
 }
 
 #[test]
 fn kitty_chunks_are_short_and_images_alternate() {
     let mut images = Images::new(Protocol::Kitty, false);
-    images.aim(Some(placement(1, 2)), true);
+    images.set_target(Some(placement(1, 2)), true);
     let first = all(&mut images);
     for command in first.split("\x1b\\").filter(|command| command.contains(';') && command.contains("_G")) {
         let data = command.rsplit(';').next().expect("data");
         assert!(data.len() <= 4096);
     }
     assert!(first.contains("a=d,d=I,i=7173121,q=2"));
-    images.aim(Some(placement(2, 2)), true);
+    images.set_target(Some(placement(2, 2)), true);
     let second = all(&mut images);
     assert!(second.contains("a=T,f=100,i=7173121") && second.contains("a=d,d=I,i=6777961,q=2"));
 }
@@ -54,13 +54,13 @@ fn kitty_chunks_are_short_and_images_alternate() {
 fn moved_image_uncovers_its_cells() {
     for protocol in [Protocol::Kitty, Protocol::Sixel, Protocol::Iterm] {
         let mut images = Images::new(protocol, false);
-        assert_eq!(images.aim(Some(placement(1, 2)), true), None);
+        assert_eq!(images.set_target(Some(placement(1, 2)), true), None);
         all(&mut images);
-        assert_eq!(images.aim(Some(placement(2, 2)), true), None, "a new image at the same position");
+        assert_eq!(images.set_target(Some(placement(2, 2)), true), None, "a new image at the same position");
         all(&mut images);
-        assert_eq!(images.aim(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
+        assert_eq!(images.set_target(Some(placement(2, 3)), true), Some(Rect::new(2, 1, 8, 3)));
         all(&mut images);
-        assert_eq!(images.aim(None, true), Some(Rect::new(3, 1, 8, 3)));
+        assert_eq!(images.set_target(None, true), Some(Rect::new(3, 1, 8, 3)));
         assert_eq!(all(&mut images).contains("a=d"), protocol == Protocol::Kitty);
         assert!(images.is_complete());
     }
@@ -70,10 +70,10 @@ fn moved_image_uncovers_its_cells() {
 fn slow_connections_get_coarser_images() {
     let mut images = Images::new(Protocol::Iterm, false);
     let picture = placement(1, 2);
-    images.aim(Some(picture.clone()), false);
+    images.set_target(Some(picture.clone()), false);
     let coarse = images.slice(5000, Some(1000.0)).expect("a picture").len();
     assert!(images.is_complete());
-    images.aim(Some(picture), true);
+    images.set_target(Some(picture), true);
     assert!(!images.is_complete(), "a final image may take longer");
     let fine = images.slice(5000, Some(10_000.0)).expect("a picture").len();
     assert!(coarse * 4 < fine, "{coarse} {fine}");
@@ -84,7 +84,7 @@ fn slow_connections_get_coarser_images() {
 fn tmux_sequences_are_wrapped() {
     assert_eq!(wrapped(b"\x1b_Gx\x1b\\"), b"\x1bPtmux;\x1b\x1b_Gx\x1b\x1b\\\x1b\\");
     let mut images = Images::new(Protocol::Iterm, true);
-    images.aim(Some(placement(1, 2)), true);
+    images.set_target(Some(placement(1, 2)), true);
     let bytes = all(&mut images);
     assert!(
         bytes.starts_with("\x1b7\x1b[2;3H\x1b[0m \x1bPtmux;\x1b\x1b[D\x1b\x1b]1337;File=inline=1;size="),
@@ -99,7 +99,7 @@ fn sixels_match_size_and_colors() {
     let pixels = (0..64 * 48).map(|i| if i % 64 < 32 { [255, 0, 0] } else { [0, 0, 255] }).collect();
     placed.picture = Arc::new(Picture { width: 64, height: 48, pixels });
     let mut images = Images::new(Protocol::Sixel, true);
-    images.aim(Some(placed), true);
+    images.set_target(Some(placed), true);
     let bytes = all(&mut images);
     assert!(bytes.contains("\x1bP0;1;0q\"1;1;64;48#16;2;100;0;0#17;2;0;0;100"), "{bytes}");
     assert!(bytes.contains("#16!32~$#17!32?!32~$-"), "{bytes}");
@@ -117,7 +117,7 @@ fn sixel_images_are_resized_to_their_cells() {
         let mut placed = placement(0, 0);
         placed.picture = Arc::new(Picture { width, height, pixels: pixels.collect() });
         let mut images = Images::new(Protocol::Sixel, false);
-        images.aim(Some(placed), true);
+        images.set_target(Some(placed), true);
         let mut screen = PixelScreen::default();
         screen.take(all(&mut images).as_bytes());
         let shown = screen.shown().expect("a picture");

@@ -44,7 +44,7 @@ impl ControlString {
 
     pub(super) fn answer(&self) -> TerminalReply {
         match self.kind {
-            ReportKind::Name => TerminalId::of_report(&String::from_utf8_lossy(&self.text))
+            ReportKind::Name => TerminalId::from_report(&String::from_utf8_lossy(&self.text))
                 .map_or(TerminalReply::Other, TerminalReply::Name),
             ReportKind::Capability if has_true_color(&self.text) => TerminalReply::TrueColor,
             ReportKind::Capability | ReportKind::Other => TerminalReply::Other,

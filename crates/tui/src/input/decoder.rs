@@ -143,7 +143,7 @@ impl Decoder {
             }
             PendingSequence::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
             PendingSequence::Paste(mut paste) => {
-                if paste.takes_last(byte, now) {
+                if paste.push(byte, now) {
                     self.meaning.found.push(DecodedInput::Paste);
                 } else {
                     self.held = PendingSequence::Paste(paste);
@@ -156,7 +156,7 @@ impl Decoder {
         let escaped = self.escaped.take().filter(|escaped| now < *escaped + LATE_SEQUENCE);
         match byte {
             ESCAPE => {
-                self.meaning.forget();
+                self.meaning.reset();
                 self.parser.advance(&mut self.meaning, &[byte]);
                 self.held = PendingSequence::Escape;
             }
@@ -224,7 +224,7 @@ impl Decoder {
 
     /// Drops the current sequence.
     fn give_up(&mut self) -> PendingSequence {
-        self.meaning.forget();
+        self.meaning.reset();
         self.command.clear();
         self.parser = vte::Parser::default();
         std::mem::take(&mut self.held)

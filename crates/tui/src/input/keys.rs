@@ -37,7 +37,7 @@ enum NextCharacter {
 
 impl KeyParser {
     /// Drops the current sequence.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.next = NextCharacter::Character;
         self.is_paste = false;
     }

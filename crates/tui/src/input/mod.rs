@@ -48,13 +48,13 @@ pub(super) fn start(events: &Sender<Event>) -> io::Result<()> {
 static HELD: (Mutex<bool>, Condvar) = (Mutex::new(false), Condvar::new());
 
 /// Leaves the input to another program, or takes it back.
-pub(super) fn hold(is_held: bool) {
+pub(super) fn set_held(is_held: bool) {
     *HELD.0.lock().unwrap_or_else(PoisonError::into_inner) = is_held;
     HELD.1.notify_all();
 }
 
 /// Waits while another program reads the input. Returns whether one did.
-fn was_held() -> bool {
+fn wait_while_held() -> bool {
     let held = HELD.0.lock().unwrap_or_else(PoisonError::into_inner);
     let was_held = *held;
     drop(HELD.1.wait_while(held, |held| *held));
@@ -65,7 +65,7 @@ fn was_held() -> bool {
 fn next(decoder: &mut Decoder) -> Option<Vec<DecodedInput>> {
     let mut bytes = [0; 4096];
     let waited = wait(decoder.deadline());
-    if was_held() {
+    if wait_while_held() {
         return Some(Vec::new());
     }
     match waited.and_then(|is_readable| if is_readable { read(&mut bytes) } else { Ok(None) }) {

@@ -62,7 +62,7 @@ impl Paste {
     }
 
     /// Takes one byte. Returns whether it completed the end marker.
-    pub(super) fn takes_last(&mut self, byte: u8, now: Instant) -> bool {
+    pub(super) fn push(&mut self, byte: u8, now: Instant) -> bool {
         let sequence = self.sequence.after(byte);
         if sequence.is_none() {
             self.last = now;

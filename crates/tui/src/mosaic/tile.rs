@@ -57,13 +57,13 @@ impl Tile {
 
 /// The tile of a character, and whether its foreground is the second part. `None` for other than block
 /// characters.
-pub(crate) fn of_symbol(symbol: char) -> Option<(Tile, bool)> {
+pub(crate) fn from_symbol(symbol: char) -> Option<(Tile, bool)> {
     // Block elements and legacy computing symbols come after all letters, digits and punctuation.
     if symbol < '▀' {
         return None;
     }
     let mask = TABLE.masks.get(&symbol)?;
-    of_mask(*mask)
+    from_mask(*mask)
 }
 
 /// The squares of a cell that a character fills with the foreground, as 12 rows of 2 columns. `None` for
@@ -78,7 +78,7 @@ pub fn filled_squares(symbol: char) -> Option<[bool; 24]> {
 }
 
 /// The tile with this mask as its first part, or as its second part if the top left corner is not in it.
-fn of_mask(mask: u32) -> Option<(Tile, bool)> {
+fn from_mask(mask: u32) -> Option<(Tile, bool)> {
     let is_second = mask & 1 == 0;
     let first = if is_second { ALL & !mask } else { mask };
     let symbol = |mask| TABLE.symbols.get(&mask).copied();
@@ -100,7 +100,7 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     };
     for (mask, symbol) in (0..).zip(QUADRANTS) {
         if !matches!(symbol, ' ' | '█') {
-            add(symbol, spread(mask, 2));
+            add(symbol, expand_mask(mask, 2));
         }
     }
     let light = Tile::LIGHT.first;
@@ -113,16 +113,16 @@ static TABLE: LazyLock<TileTable> = LazyLock::new(|| {
     let mut next = SEXTANTS;
     for mask in 1..63 {
         if !SEXTANTS_ELSEWHERE.contains(&mask) {
-            add(char::from_u32(next).unwrap_or(' '), spread(mask, 3));
+            add(char::from_u32(next).unwrap_or(' '), expand_mask(mask, 3));
             next += 1;
         }
     }
     let mut next = OCTANTS;
     for mask in 0..256 {
         if let Some((_, symbol)) = OCTANTS_ELSEWHERE.iter().find(|(other, _)| *other == mask) {
-            add(*symbol, spread(mask, 4));
+            add(*symbol, expand_mask(mask, 4));
         } else if quadrants(mask).is_none() {
-            add(char::from_u32(next).unwrap_or(' '), spread(mask, 4));
+            add(char::from_u32(next).unwrap_or(' '), expand_mask(mask, 4));
             next += 1;
         }
     }
@@ -156,7 +156,7 @@ const OCTANTS_ELSEWHERE: [(u32, char); 10] = [
 ];
 
 /// Expands a mask with `rows` rows to the full grid.
-fn spread(mask: u32, rows: u32) -> u32 {
+fn expand_mask(mask: u32, rows: u32) -> u32 {
     widened(mask, rows, GRID_ROWS)
 }
 
@@ -170,7 +170,7 @@ fn widened(mask: u32, from: u32, to: u32) -> u32 {
 
 /// The quadrants that are equal to these octants, if any.
 fn quadrants(mask: u32) -> Option<u32> {
-    (0..16).find(|quadrants| spread(*quadrants, 2) == spread(mask, 4))
+    (0..16).find(|quadrants| expand_mask(*quadrants, 2) == expand_mask(mask, 4))
 }
 
 /// Grids that divide a cell.
@@ -228,7 +228,7 @@ fn divisions(pixel_rows: u32, part_rows: &[u32]) -> Vec<CellDivision> {
         let half = 1_u32 << (2 * rows - 1);
         // Gray code. The top left part is always included.
         for mask in (0..half).map(|i| (i ^ i >> 1) << 1 | 1) {
-            let of_tile = of_mask(spread(mask, *rows)).map(|(tile, _)| tile);
+            let of_tile = from_mask(expand_mask(mask, *rows)).map(|(tile, _)| tile);
             let is_new = |tile: &Tile| divisions.iter().all(|division: &CellDivision| division.tile != *tile);
             if let Some(tile) = of_tile.filter(is_new) {
                 divisions.push(CellDivision { first: widened(mask, *rows, pixel_rows), tile });
@@ -250,8 +250,8 @@ mod tests {
             for CellDivision { first, tile } in divisions {
                 assert_eq!(tile.first, widened(*first, grid.rows(), GRID_ROWS), "{grid:?} {first:b}");
                 let [front, back] = tile.symbols();
-                assert_eq!(of_symbol(front), Some((*tile, false)), "{front}");
-                assert_eq!(of_symbol(back), Some((*tile, true)), "{back}");
+                assert_eq!(from_symbol(front), Some((*tile, false)), "{front}");
+                assert_eq!(from_symbol(back), Some((*tile, true)), "{back}");
                 assert!(seen.insert(front) && seen.insert(back));
             }
             assert_eq!(divisions.len(), count, "{grid:?}");
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn known_block_characters() {
-        let symbol = |mask, rows| TABLE.symbols[&spread(mask, rows)];
+        let symbol = |mask, rows| TABLE.symbols[&expand_mask(mask, rows)];
         assert_eq!(symbol(0b1001, 2), '▚');
         assert_eq!(symbol(1, 3), '🬀');
         assert_eq!(symbol(0b01_01_01, 3), '▌');
@@ -275,10 +275,10 @@ mod tests {
     #[test]
     fn shades_fill_one_two_or_three_quarters() {
         for (symbol, share) in [('░', 6), ('▒', 12), ('▓', 18)] {
-            let (tile, is_second) = of_symbol(symbol).expect("a tile");
+            let (tile, is_second) = from_symbol(symbol).expect("a tile");
             assert_eq!(tile.sizes()[usize::from(is_second)], share, "{symbol}");
         }
-        assert_eq!(of_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
-        assert_eq!(of_symbol('a'), None);
+        assert_eq!(from_symbol('▒').map(|(tile, _)| tile.symbols()), Some(['▒', '▒']));
+        assert_eq!(from_symbol('a'), None);
     }
 }

@@ -46,11 +46,11 @@ fn shades(wanted: &(impl Iterator<Item = TerminalColor> + Clone), model: CostMod
         return shades;
     };
     for span in model.spans {
-        let box_ = common(wanted.clone(), *span);
+        let box_ = common_colors(wanted.clone(), *span);
         add(TerminalColor::Rgb(box_.shortest()));
         let index = nearest_256(box_.mean());
         let fixed = TerminalColor::Palette(index);
-        if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.holds(rgb)) {
+        if index >= FIRST_UNTOUCHED && fixed.rgb().is_some_and(|rgb| box_.contains(rgb)) {
             add(fixed);
         }
     }
@@ -66,7 +66,7 @@ struct CommonColors {
 }
 
 /// The colors within `span` of as many of the leading `wanted` colors as possible.
-fn common(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
+fn common_colors(wanted: impl Iterator<Item = TerminalColor>, span: u8) -> CommonColors {
     let mut common = CommonColors { low: [0; 3], high: [255; 3], sum: [0; 3], count: 0 };
     for shade in wanted.take(LONGEST) {
         let TerminalColor::Rgb(rgb) = shade else { break };
@@ -99,7 +99,7 @@ impl CommonColors {
         })
     }
 
-    fn holds(&self, rgb: [u8; 3]) -> bool {
+    fn contains(&self, rgb: [u8; 3]) -> bool {
         (0..3).all(|i| (self.low[i]..=self.high[i]).contains(&rgb[i]))
     }
 }

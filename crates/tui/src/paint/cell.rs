@@ -7,7 +7,7 @@ use unicode_width::UnicodeWidthStr;
 use super::pen::{Pen, PenRequirements};
 use super::terminal_color::{ColorLayer, TerminalColor};
 use crate::color::ColorDepth;
-use crate::mosaic::{PLACES, Tile, of_symbol};
+use crate::mosaic::{PLACES, Tile, from_symbol};
 
 /// Content of one cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl Mosaic {
             "█" => return Some(Self::plain(fg)),
             _ => {}
         }
-        let (tile, is_second) = of_symbol(symbol.chars().next()?)?;
+        let (tile, is_second) = from_symbol(symbol.chars().next()?)?;
         Some(Self::new(tile, if is_second { [bg, fg] } else { [fg, bg] }))
     }
 

@@ -24,7 +24,7 @@ pub(super) fn go(from: Option<CellPosition>, to: CellPosition, out: &mut Vec<u8>
         }
     };
     if from.y == to.y {
-        consider(along(from.x, to.x));
+        consider(horizontal_move(from.x, to.x));
         consider(with_return(&[], to.x));
     } else if from.y < to.y {
         let down = usize::from(to.y - from.y);
@@ -55,7 +55,7 @@ fn absolute(to: CellPosition, out: &mut Vec<u8>) {
 }
 
 /// Movement within a row (CUF or CUB). CHA is never shorter than both this and CUP.
-fn along(from: u16, to: u16) -> Vec<u8> {
+fn horizontal_move(from: u16, to: u16) -> Vec<u8> {
     if to >= from { control(to - from, b'C') } else { control(from - to, b'D') }
 }
 
@@ -85,7 +85,7 @@ mod tests {
 
     use super::*;
 
-    fn moved(from: (u16, u16), to: (u16, u16)) -> String {
+    fn bytes_of_move(from: (u16, u16), to: (u16, u16)) -> String {
         let mut out = Vec::new();
         go(Some(CellPosition { x: from.0, y: from.1 }), CellPosition { x: to.0, y: to.1 }, &mut out);
         String::from_utf8(out).expect("ASCII")
@@ -93,15 +93,15 @@ mod tests {
 
     #[test]
     fn cursor_moves_are_short() {
-        assert_eq!(moved((5, 5), (5, 5)), "");
-        assert_eq!(moved((5, 5), (6, 5)), "\x1b[C");
-        assert_eq!(moved((5, 5), (0, 5)), "\r");
-        assert_eq!(moved((5, 5), (0, 6)), "\r\n");
-        assert_eq!(moved((5, 15), (2, 16)), "\r\n\x1b[2C");
-        assert_eq!(moved((5, 5), (2, 6)), "\x1b[7;3H");
-        assert_eq!(moved((5, 5), (0, 0)), "\x1b[H");
-        assert_eq!(moved((5, 5), (5, 6)), "\x1b[B");
-        assert_eq!(moved((5, 5), (90, 30)), "\x1b[31;91H");
+        assert_eq!(bytes_of_move((5, 5), (5, 5)), "");
+        assert_eq!(bytes_of_move((5, 5), (6, 5)), "\x1b[C");
+        assert_eq!(bytes_of_move((5, 5), (0, 5)), "\r");
+        assert_eq!(bytes_of_move((5, 5), (0, 6)), "\r\n");
+        assert_eq!(bytes_of_move((5, 15), (2, 16)), "\r\n\x1b[2C");
+        assert_eq!(bytes_of_move((5, 5), (2, 6)), "\x1b[7;3H");
+        assert_eq!(bytes_of_move((5, 5), (0, 0)), "\x1b[H");
+        assert_eq!(bytes_of_move((5, 5), (5, 6)), "\x1b[B");
+        assert_eq!(bytes_of_move((5, 5), (90, 30)), "\x1b[31;91H");
     }
 
     proptest! {

@@ -15,11 +15,11 @@ pub fn as_text_lines(buffer: &Buffer, is_colored: bool) -> String {
         let mut pen = Pen::RESET;
         for cell in &row[..length] {
             if is_colored {
-                pen.turn(&pen_of(cell).exactly(), &mut bytes);
+                pen.switch_to(&pen_of(cell).exactly(), &mut bytes);
             }
             bytes.extend_from_slice(cell.symbol().as_bytes());
         }
-        pen.turn(&Pen::RESET.exactly(), &mut bytes);
+        pen.switch_to(&Pen::RESET.exactly(), &mut bytes);
         bytes.push(b'\n');
     }
     String::from_utf8_lossy(&bytes).into_owned()

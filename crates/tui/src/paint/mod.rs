@@ -129,12 +129,18 @@ impl Painter {
     ///
     /// The preview continues with the rows that earlier targets did not reach, so it is drawn up to its edges
     /// even if targets change faster than they can be drawn.
-    pub fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        self.aim_with(wanted, picture, fidelity, &FrameExtras::default());
+    pub fn set_target(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
+        self.set_target_with(wanted, picture, fidelity, &FrameExtras::default());
     }
 
-    /// Like [`Painter::aim`], with hyperlinks and with text that is drawn after the preview.
-    pub fn aim_with(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, extras: &FrameExtras) {
+    /// Like [`Painter::set_target`], with hyperlinks and with text that is drawn after the preview.
+    pub fn set_target_with(
+        &mut self,
+        wanted: &Buffer,
+        picture: Rect,
+        fidelity: Fidelity,
+        extras: &FrameExtras,
+    ) {
         let mut wanted = TargetScreen::new(wanted, picture, fidelity, self.depth).with_later(extras.later);
         for Hyperlink { cells, address } in &extras.links {
             wanted.link(*cells, self.links.number(address));
@@ -147,12 +153,12 @@ impl Painter {
             self.rows = vec![RowProgress::default(); usize::from(wanted.rows)];
         }
         for (y, row) in (0..wanted.rows).zip(&mut self.rows) {
-            row.is_done = row.is_done && self.wanted.serves(&wanted, y);
+            row.is_done = row.is_done && self.wanted.satisfies(&wanted, y);
             if fidelity == Fidelity::First && !row.is_done {
                 row.aim = 0;
             }
         }
-        self.memory.aim(&wanted, self.screen.as_ref());
+        self.memory.set_target(&wanted, self.screen.as_ref());
         self.wanted = wanted;
         self.aim += 1;
         self.start_over();
@@ -240,9 +246,9 @@ impl Painter {
     }
 
     /// Marks the whole screen as unknown; it is cleared before the next draw.
-    pub fn forget(&mut self) {
+    pub fn invalidate(&mut self) {
         self.screen = None;
-        self.memory.forget();
+        self.memory.invalidate();
         self.rows.fill(RowProgress::default());
         self.start_over();
     }

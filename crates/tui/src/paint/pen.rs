@@ -64,7 +64,7 @@ impl Pen {
 
     /// Appends the shortest SGR sequence that makes the pen meet the requirements, if it does not already.
     /// The screen model handles hyperlinks.
-    pub(super) fn turn(&mut self, requirements: &PenRequirements, out: &mut Vec<u8>) {
+    pub(super) fn switch_to(&mut self, requirements: &PenRequirements, out: &mut Vec<u8>) {
         let mut list = Vec::new();
         let changed = self.changed(requirements, &mut list);
         if list.is_empty() {
@@ -129,9 +129,9 @@ mod tests {
 
     use super::*;
 
-    fn turned(from: Pen, to: Pen) -> String {
+    fn bytes_of_switch(from: Pen, to: Pen) -> String {
         let (mut pen, mut out) = (from, Vec::new());
-        pen.turn(&to.exactly(), &mut out);
+        pen.switch_to(&to.exactly(), &mut out);
         assert_eq!(pen, to);
         String::from_utf8(out).expect("ASCII")
     }
@@ -140,15 +140,15 @@ mod tests {
     fn unchanged_attributes_are_not_sent() {
         let bold = Pen { modifier: Modifier::BOLD, ..Pen::RESET };
         let red = Pen { fg: TerminalColor::Palette(1), ..bold };
-        assert_eq!(turned(red, red), "");
-        assert_eq!(turned(Pen::RESET, red), "\x1b[1;31m");
-        assert_eq!(turned(red, bold), "\x1b[39m");
-        assert_eq!(turned(red, Pen::RESET), "\x1b[0m");
+        assert_eq!(bytes_of_switch(red, red), "");
+        assert_eq!(bytes_of_switch(Pen::RESET, red), "\x1b[1;31m");
+        assert_eq!(bytes_of_switch(red, bold), "\x1b[39m");
+        assert_eq!(bytes_of_switch(red, Pen::RESET), "\x1b[0m");
         let dim = Pen { modifier: Modifier::DIM, ..red };
-        assert_eq!(turned(red, dim), "\x1b[22;2m");
+        assert_eq!(bytes_of_switch(red, dim), "\x1b[22;2m");
         let colors =
             Pen { fg: TerminalColor::Rgb([1, 2, 3]), bg: TerminalColor::Rgb([4, 5, 6]), ..Pen::RESET };
-        assert_eq!(turned(red, colors), "\x1b[0;38;2;1;2;3;48;2;4;5;6m");
+        assert_eq!(bytes_of_switch(red, colors), "\x1b[0;38;2;1;2;3;48;2;4;5;6m");
     }
 
     fn pen() -> impl Strategy<Value = Pen> {
@@ -179,7 +179,7 @@ mod tests {
             let mut current = Pen::RESET;
             for pen in pens {
                 let mut out = Vec::new();
-                current.turn(&pen.exactly(), &mut out);
+                current.switch_to(&pen.exactly(), &mut out);
                 parser.process(&out);
                 let screen = parser.screen();
                 let modifiers = [

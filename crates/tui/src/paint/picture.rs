@@ -34,7 +34,7 @@ impl Default for ByteBudget {
 impl ByteBudget {
     /// Plans a row with the least error that fits into the budget. The cost of a byte falls again after rows
     /// that left bytes over.
-    fn spend(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
+    fn use_budget(&mut self, targets: &[TargetCell], start: RowStart) -> PlannedRow {
         let share = FIRST_BYTES * targets.len() as u32;
         self.bytes += share;
         if self.bytes > 2 * share {
@@ -73,7 +73,7 @@ pub(super) fn plan(
         Fidelity::Still => plan_row(&targets, start, CostModel::EXACT),
         Fidelity::Following => plan_row(&targets, start, CostModel::ALL),
         Fidelity::Moving => plan_row(&targets, start, CostModel::MOVING),
-        Fidelity::First => budget.spend(&targets, start),
+        Fidelity::First => budget.use_budget(&targets, start),
     };
     let stroke = |op: DrawOp| Stroke::Mosaic {
         at: CellPosition { x: columns.start + op.column as u16, y },

@@ -10,7 +10,8 @@ pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
     let get = |name: &str| variable(name).unwrap_or_default();
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
     TERMS.iter().any(|name| term.starts_with(name))
-        || (get("TMUX").is_empty() && Brand::of_program(&program).is_some_and(Brand::has_colors_and_repeats))
+        || (get("TMUX").is_empty()
+            && Brand::from_program(&program).is_some_and(Brand::has_colors_and_repeats))
 }
 
 #[cfg(test)]

@@ -173,7 +173,7 @@ impl Beam {
     }
 
     /// The cost above which a path cannot enter the beam.
-    fn bound(&self) -> f32 {
+    fn cost_bound(&self) -> f32 {
         let (mut best, mut worst) = (f32::INFINITY, 0.0_f32);
         for path in &self.paths {
             (best, worst) = (best.min(path.cost), worst.max(path.cost));
@@ -288,7 +288,7 @@ impl<'a> PathEnd<'a> {
     fn new(changes: &ColorChanges, parent: usize, path: &DrawPath, beam: &'a mut Beam) -> Self {
         let byte = changes.model.byte;
         let error = path.cost - path.bytes as f32 * byte;
-        let bound = beam.bound();
+        let bound = beam.cost_bound();
         let tile = changes.mosaic.tile;
         Self { parent, bytes: path.bytes + path.gap.bytes(), error, byte, tile, beam, bound }
     }
@@ -310,7 +310,7 @@ impl<'a> PathEnd<'a> {
             let parent = self.parent;
             let (pen, gap, glyph) = (pen(fg, bg), CursorGap::Cells(0), Some(glyph));
             self.beam.add(DrawPath { fg, bg, pen, gap, bytes, cost, parent, glyph });
-            self.bound = self.beam.bound();
+            self.bound = self.beam.cost_bound();
         }
     }
 }
@@ -372,7 +372,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mosaic::of_symbol;
+    use crate::mosaic::from_symbol;
 
     const BLACK: TerminalColor = TerminalColor::Rgb([0, 0, 0]);
     const RED: TerminalColor = TerminalColor::Rgb([200, 0, 0]);
@@ -445,7 +445,7 @@ mod tests {
         let tile = prop_oneof![
             3 => Just(Tile::HALVES),
             1 => proptest::sample::select(vec!['▌', '▚', '░', '▒', '🬟', '\u{1CD10}'])
-                .prop_map(|symbol| of_symbol(symbol).expect("a tile").0),
+                .prop_map(|symbol| from_symbol(symbol).expect("a tile").0),
         ];
         (tile, [shade(), shade()]).prop_map(|(tile, pair)| {
             // Normalized as if read from a character: the first part is the foreground.

@@ -148,7 +148,7 @@ impl ScreenModel {
             links.open(requirements.link, bytes);
             self.pen.link = requirements.link;
         }
-        self.pen.turn(&requirements, bytes);
+        self.pen.switch_to(&requirements, bytes);
         match stroke {
             Stroke::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),
             Stroke::Mosaic { glyph, mosaic, count, .. } => {

@@ -34,12 +34,12 @@ pub(super) struct StableCells {
 
 impl StableCells {
     /// Marks the whole screen as unknown.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn invalidate(&mut self) {
         self.firsts.fill(None);
         self.steady.fill(false);
     }
 
-    pub(super) fn aim(&mut self, wanted: &TargetScreen, screen: Option<&ScreenModel>) {
+    pub(super) fn set_target(&mut self, wanted: &TargetScreen, screen: Option<&ScreenModel>) {
         let cells = usize::from(wanted.columns) * usize::from(wanted.rows);
         if self.picture != wanted.picture || self.firsts.len() != cells {
             *self = Self {
@@ -68,7 +68,7 @@ impl StableCells {
         self.newest = places.map(|(x, y)| wanted.mosaic(x, y)).collect();
         self.noise = u8::MAX;
         for (steady, (first, newest)) in self.steady.iter_mut().zip(self.firsts.iter().zip(&self.newest)) {
-            *steady = first.zip(*newest).is_some_and(|(a, b)| apart(a, b) <= ALIKE);
+            *steady = first.zip(*newest).is_some_and(|(a, b)| color_difference(a, b) <= ALIKE);
         }
     }
 
@@ -83,7 +83,7 @@ impl StableCells {
                     screen.content(CellPosition { x, y }),
                     wanted.mosaic(x, y),
                 ) {
-                    counts[usize::from(apart(*shown, wanted))] += 1;
+                    counts[usize::from(color_difference(*shown, wanted))] += 1;
                 }
             }
         }
@@ -100,7 +100,8 @@ impl StableCells {
     pub(super) fn mosaic(&self, at: CellPosition, wanted: Mosaic, shown: Option<Mosaic>) -> Mosaic {
         shown
             .filter(|shown| {
-                self.is_steady(at) && (self.noise == u8::MAX || apart(*shown, wanted) <= self.noise)
+                self.is_steady(at)
+                    && (self.noise == u8::MAX || color_difference(*shown, wanted) <= self.noise)
             })
             .unwrap_or(wanted)
     }
@@ -148,7 +149,7 @@ fn noise(median: usize) -> u8 {
 }
 
 /// The largest channel difference; 255 if the colors cannot be compared.
-fn apart(a: Mosaic, b: Mosaic) -> u8 {
+fn color_difference(a: Mosaic, b: Mosaic) -> u8 {
     let one = |a: TerminalColor, b: TerminalColor| match (a.rgb(), b.rgb()) {
         _ if a == b => 0,
         (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| a.abs_diff(b)).max().unwrap_or(0),

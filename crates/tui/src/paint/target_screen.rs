@@ -51,7 +51,7 @@ impl TargetScreen {
     }
 
     /// Whether a row drawn for this target also satisfies `other`.
-    pub(super) fn serves(&self, other: &Self, y: u16) -> bool {
+    pub(super) fn satisfies(&self, other: &Self, y: u16) -> bool {
         let is_as_near = self.fidelity == other.fidelity
             || (matches!(self.fidelity, Fidelity::Still | Fidelity::Following)
                 && other.fidelity == Fidelity::Moving);
@@ -90,7 +90,7 @@ impl TargetScreen {
     /// The region that a cell belongs to.
     pub(super) fn region(&self, x: u16, y: u16) -> ScreenRegion {
         match () {
-            () if self.is_picture(x, y) => ScreenRegion::Picture,
+            () if self.is_preview(x, y) => ScreenRegion::Picture,
             () if !self.later.contains((x, y).into()) => ScreenRegion::Words,
             () if self.row(y)[usize::from(x)] == CellContent::BLANK => ScreenRegion::Words,
             () => ScreenRegion::Later,
@@ -98,7 +98,7 @@ impl TargetScreen {
     }
 
     /// Whether a cell belongs to the preview: a mosaic or, without colors, a ramp character.
-    pub(super) fn is_picture(&self, x: u16, y: u16) -> bool {
+    pub(super) fn is_preview(&self, x: u16, y: u16) -> bool {
         let is_tone = |symbol: &str| matches!(symbol.as_bytes(), [byte] if byte.is_ascii_punctuation());
         self.picture.contains((x, y).into())
             && match &self.row(y)[usize::from(x)] {

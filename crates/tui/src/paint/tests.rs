@@ -55,7 +55,7 @@ impl TestTerminal {
         for (i, look) in contents.iter().enumerate() {
             let (x, y) = (i as u16 % wanted.area.width, i as u16 / wanted.area.width);
             let cell = self.terminal.screen().cell(y, x).expect("a cell");
-            match (look, shown(cell)) {
+            match (look, cell_content(cell)) {
                 (CellContent::Mosaic(a), CellContent::Mosaic(b)) => {
                     for (a, b, _) in a.against(b) {
                         largest =
@@ -79,7 +79,7 @@ fn distance(a: TerminalColor, b: TerminalColor) -> Option<u32> {
 }
 
 /// The content of a terminal cell. vt100 knows fewer modifiers.
-fn shown(cell: &vt100::Cell) -> CellContent {
+fn cell_content(cell: &vt100::Cell) -> CellContent {
     if cell.is_wide_continuation() {
         return CellContent::Covered;
     }
@@ -211,22 +211,22 @@ proptest! {
         let mut test = TestTerminal::repeating(COLUMNS, ROWS, depth, can_repeat);
         for step in steps {
             match step {
-                PainterStep::Aim(buffer, fidelity) => test.painter.aim(&buffer, PICTURE, fidelity),
+                PainterStep::Aim(buffer, fidelity) => test.painter.set_target(&buffer, PICTURE, fidelity),
                 PainterStep::Slice(most_bytes) => {
                     test.slice(most_bytes);
                 }
-                PainterStep::Forget => test.painter.forget(),
+                PainterStep::Forget => test.painter.invalidate(),
                 PainterStep::Litter => {
                     test.terminal.process(b"\x1b[7;31;44mshell$ \x1b[5;5Hx\n\n\n\n\n\n\n");
-                    test.painter.forget();
+                    test.painter.invalidate();
                 }
             }
         }
-        test.painter.aim(&last, PICTURE, Fidelity::Still);
+        test.painter.set_target(&last, PICTURE, Fidelity::Still);
         test.finish(most_bytes);
         let largest = test.difference(&last, depth);
         prop_assert!(largest <= 1, "{largest}");
-        test.painter.aim(&last, PICTURE, Fidelity::Still);
+        test.painter.set_target(&last, PICTURE, Fidelity::Still);
         prop_assert_eq!(test.finish(most_bytes), 0, "an up-to-date screen needs no bytes");
     }
 
@@ -234,7 +234,7 @@ proptest! {
     fn text_is_exact_at_every_fidelity(buffers in proptest::collection::vec((buffer(), fidelity()), 1..5), depth in depth()) {
         let mut test = TestTerminal::new(COLUMNS, ROWS, depth);
         for (buffer, fidelity) in buffers {
-            test.painter.aim(&buffer, Rect::ZERO, fidelity);
+            test.painter.set_target(&buffer, Rect::ZERO, fidelity);
             test.finish(100);
             prop_assert_eq!(test.difference(&buffer, depth), 0);
         }
@@ -248,7 +248,7 @@ fn resize_starts_a_new_screen() {
         let area = Rect::new(0, 0, columns, rows);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, "words", ratatui::style::Style::new());
-        test.painter.aim(&buffer, area, Fidelity::Still);
+        test.painter.set_target(&buffer, area, Fidelity::Still);
         test.finish(1000);
         assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
     }
@@ -270,7 +270,7 @@ fn text_is_drawn_first_then_middle_rows() {
     buffer.set_string(0, 8, "words", ratatui::style::Style::new());
     buffer.set_string(5, 3, "over_it", ratatui::style::Style::reset());
     let mut test = TestTerminal::new(30, 9, ColorDepth::TrueColor);
-    test.painter.aim(&buffer, picture, Fidelity::Still);
+    test.painter.set_target(&buffer, picture, Fidelity::Still);
     test.slice(100);
     let row =
         |test: &TestTerminal, y: u16| test.terminal.screen().rows(0, 30).nth(usize::from(y)).expect("a row");
@@ -288,7 +288,7 @@ fn text_is_drawn_first_then_middle_rows() {
 fn painter_without_target_sends_nothing() {
     let mut painter = Painter::new(ColorDepth::TrueColor);
     assert_eq!(painter.slice(1000), b"");
-    painter.forget();
+    painter.invalidate();
     assert_eq!(painter.slice(1000), b"");
 }
 
@@ -301,7 +301,7 @@ fn character_preview_is_drawn_after_text() {
     }
     buffer.set_string(0, 5, "words", ratatui::style::Style::new());
     let mut test = TestTerminal::new(20, 6, ColorDepth::None);
-    test.painter.aim(&buffer, picture, Fidelity::Moving);
+    test.painter.set_target(&buffer, picture, Fidelity::Moving);
     let mut order = Vec::new();
     while test.slice(24) {
         let rows: Vec<String> = test.terminal.screen().rows(0, 20).collect();
@@ -321,11 +321,11 @@ fn long_blanks_are_erased() {
     full.set_string(0, 0, "x".repeat(60), ratatui::style::Style::new());
     let mut test = TestTerminal::new(60, 1, ColorDepth::TrueColor);
     for (text, most) in [("x".repeat(20), 12), (format!("{}{}x", "x".repeat(20), " ".repeat(39)), 16)] {
-        test.painter.aim(&full, Rect::ZERO, Fidelity::Still);
+        test.painter.set_target(&full, Rect::ZERO, Fidelity::Still);
         test.finish(100);
         let mut buffer = Buffer::empty(area);
         buffer.set_string(0, 0, &text, ratatui::style::Style::new());
-        test.painter.aim(&buffer, Rect::ZERO, Fidelity::Still);
+        test.painter.set_target(&buffer, Rect::ZERO, Fidelity::Still);
         let sent = test.finish(100);
         assert!(sent <= most, "{sent} bytes for {text:?}");
         assert_eq!(test.difference(&buffer, ColorDepth::TrueColor), 0);
@@ -350,7 +350,7 @@ fn delayed_text_follows_the_preview() {
     let later = Rect { x: 0, y: 7, width: COLUMNS, height: 1 };
     for extras in [FrameExtras { later, ..FrameExtras::default() }, FrameExtras::default()] {
         let mut test = TestTerminal::new(COLUMNS, ROWS, ColorDepth::TrueColor);
-        test.painter.aim_with(&buffer, PICTURE, Fidelity::Still, &extras);
+        test.painter.set_target_with(&buffer, PICTURE, Fidelity::Still, &extras);
         let mut cells_before = None;
         while test.slice(60) {
             let text = test.terminal.screen().contents();
@@ -380,7 +380,7 @@ fn hyperlink_covers_only_its_cells() {
     };
     let mut painter = Painter::new(ColorDepth::TrueColor);
     let mut sent = |extras: &FrameExtras| {
-        painter.aim_with(&buffer, PICTURE, Fidelity::Still, extras);
+        painter.set_target_with(&buffer, PICTURE, Fidelity::Still, extras);
         let mut bytes = Vec::new();
         loop {
             let slice = painter.slice(100);

@@ -75,7 +75,7 @@ fn erased(wanted: &TargetScreen, y: u16, strokes: &[Stroke]) -> Vec<Stroke> {
         let at = run[0].at();
         let end = usize::from(at.x) + run.len();
         let rest = end as u16..wanted.columns;
-        let is_last = rest.clone().all(|x| !wanted.is_picture(x, y))
+        let is_last = rest.clone().all(|x| !wanted.is_preview(x, y))
             && wanted.row(y)[end.min(usize::from(wanted.columns))..]
                 .iter()
                 .all(|look| *look == CellContent::BLANK);

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{Message, OverlayState, Pane, Problems, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, ImageOrigin, RequestState, Toggles, signed_stops};
+pub(super) use self::request::{CameraStep, ImageOrigin, RequestState, Toggles, format_stops};
 pub(super) use self::saving::{OwnImage, PendingChange, SavingState, WrittenFile};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};

@@ -69,7 +69,7 @@ impl Toggles {
             ("photons", self.photons != before.photons, self.photons.map(on_off)),
             ("view", self.view != before.view, self.view.map(|it| name(it.name()))),
             ("camera", self.camera != before.camera && !(is_camera_written && camera.is_none()), camera),
-            ("exposure", self.exposure != before.exposure, self.exposure.map(signed_stops)),
+            ("exposure", self.exposure != before.exposure, self.exposure.map(format_stops)),
         ];
         let differing = || all.iter().filter(|(_, differs, _)| *differs);
         let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
@@ -103,7 +103,7 @@ pub(crate) struct ImageOrigin {
 
 impl ImageOrigin {
     /// The origin without the exposure, which does not affect the render.
-    pub(crate) fn of_light(self) -> Self {
+    pub(crate) fn without_exposure(self) -> Self {
         Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
     }
 
@@ -131,7 +131,7 @@ impl ImageOrigin {
 }
 
 /// Stops of exposure with a sign.
-pub(crate) fn signed_stops(stops: f32) -> String {
+pub(crate) fn format_stops(stops: f32) -> String {
     match stops {
         0.0 => "0".to_owned(),
         stops if stops < 0.0 => format!("−{}", -stops),
@@ -316,7 +316,7 @@ impl RequestState {
         let is_moved = pose.is_some() || fov.is_some();
         let moved = is_moved.then(|| "camera".to_owned());
         let focused = (focus.is_some() && !is_moved).then(|| "focus".to_owned());
-        let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", signed_stops(it)));
+        let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", format_stops(it)));
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
@@ -381,6 +381,6 @@ mod tests {
 
     #[test]
     fn exposure_uses_a_minus_sign() {
-        assert_eq!([-0.25, 0.0, 1.5].map(signed_stops), ["−0.25", "0", "+1.5"]);
+        assert_eq!([-0.25, 0.0, 1.5].map(format_stops), ["−0.25", "0", "+1.5"]);
     }
 }

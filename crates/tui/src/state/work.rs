@@ -103,7 +103,7 @@ impl WorkState {
     }
 
     /// Restores the curve of an image that is found again, if it is known.
-    pub(crate) fn find_curve(&mut self, origin: &ImageOrigin) {
+    pub(crate) fn restore_curve(&mut self, origin: &ImageOrigin) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }
@@ -118,7 +118,7 @@ impl WorkState {
     }
 
     /// Time that the current request has been running, without pauses.
-    pub(crate) fn running_for(&self, now: Instant) -> Option<Duration> {
+    pub(crate) fn running_time(&self, now: Instant) -> Option<Duration> {
         match self.activity {
             Activity::Running { since } => {
                 Some(self.paused_at.unwrap_or(now).saturating_duration_since(since))
@@ -127,11 +127,11 @@ impl WorkState {
         }
     }
 
-    /// Like [`WorkState::running_for`], plus the time in which earlier requests rendered its samples.
-    pub(crate) fn rendering_for(&self, now: Instant) -> Option<Duration> {
+    /// Like [`WorkState::running_time`], plus the time in which earlier requests rendered its samples.
+    pub(crate) fn rendering_time(&self, now: Instant) -> Option<Duration> {
         let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
         let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();
-        self.running_for(now).map(|time| time.saturating_add(earlier))
+        self.running_time(now).map(|time| time.saturating_add(earlier))
     }
 
     /// Pauses or resumes the clock of the request.

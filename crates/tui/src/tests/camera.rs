@@ -228,7 +228,7 @@ fn kept(ui: &mut TestUi) -> Option<Viewpoint> {
     ui.press('c').into_iter().find_map(is_order)
 }
 
-fn moved_to(position: [f64; 3]) -> Viewpoint {
+fn viewpoint_at(position: [f64; 3]) -> Viewpoint {
     let camera = camera();
     Viewpoint { pose: Pose { position: position.into(), ..camera.pose }, ..camera }
 }
@@ -237,9 +237,9 @@ fn moved_to(position: [f64; 3]) -> Viewpoint {
 fn conflicting_saves_are_listed_before_c() {
     let wide = |fov| Viewpoint { fov, ..camera() };
     let look_at = Viewpoint { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
-    let both = Viewpoint { fov: 25.0, ..moved_to([0.0, 2.0, 4.0]) };
+    let both = Viewpoint { fov: 25.0, ..viewpoint_at([0.0, 2.0, 4.0]) };
     for (keys, saved, words) in [
-        ("h", moved_to([0.0, 2.0, 4.0]), "camera.position = [0, 2, 4]"),
+        ("h", viewpoint_at([0.0, 2.0, 4.0]), "camera.position = [0, 2, 4]"),
         ("h", look_at, "camera.look_at = [0, 0.5, 0]"),
         ("<", wide(25.0), "camera.fov = 25"),
         ("h<", both, "camera.position = [0, 2, 4], camera.fov = 25"),
@@ -267,7 +267,7 @@ fn later_saves_are_listed_again() {
     ui.press('h');
     show(&mut ui);
     for height in [2.0, 3.0] {
-        save(&mut ui, moved_to([0.0, height, 4.0]));
+        save(&mut ui, viewpoint_at([0.0, height, 4.0]));
         assert_eq!(kept(&mut ui), None);
         assert!(ui.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", ui.text());
     }
@@ -292,7 +292,7 @@ fn unmoved_settings_of_a_save_are_kept() {
     ui.finish(RED);
     ui.state.request.toggles.camera.focus = Some(2.5);
     ui.press('r');
-    save(&mut ui, moved_to([0.0, 1.0, 6.0]));
+    save(&mut ui, viewpoint_at([0.0, 1.0, 6.0]));
     assert_eq!(kept(&mut ui).map(|camera| (camera.focus, camera.pose.position.z)), Some((2.5, 6.0)));
 }
 
@@ -302,7 +302,7 @@ fn reset_camera_is_moved_without_conflict() {
     ui.finish(RED);
     ui.press('h');
     show(&mut ui);
-    save(&mut ui, moved_to([0.0, 2.0, 4.0]));
+    save(&mut ui, viewpoint_at([0.0, 2.0, 4.0]));
     ui.press('0');
     ui.press('h');
     assert!(kept(&mut ui).is_some());
@@ -316,6 +316,6 @@ fn model_camera_has_no_conflicts() {
     ui.press('h');
     show(&mut ui);
     // The model has another size by now and is framed again.
-    save(&mut ui, moved_to([0.0, 2.0, 4.0]));
+    save(&mut ui, viewpoint_at([0.0, 2.0, 4.0]));
     assert!(kept(&mut ui).is_some());
 }

@@ -20,7 +20,7 @@ fn save(ui: &mut TestUi, text: &str) {
 }
 
 /// Saves a scene with an error.
-fn typo(ui: &mut TestUi) {
+fn save_broken_scene(ui: &mut TestUi) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
     ui.event(Event::Settled);
@@ -64,7 +64,7 @@ fn fixed_typo_is_not_an_edit() {
     read(&mut ui);
     preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
-    typo(&mut ui);
+    save_broken_scene(&mut ui);
     // The last valid scene is shown again, possibly dithered differently.
     preview(&mut ui, "dull", GREEN, true);
     save(&mut ui, "shininess = 6");
@@ -102,15 +102,15 @@ fn output_edit_adds_no_entry() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "camera.fov = 40");
     read(&mut ui);
-    shown(&mut ui, "narrow", RED, true);
+    show_preview(&mut ui, "narrow", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     save(&mut ui, "camera.fov = 44");
     read(&mut ui);
-    shown(&mut ui, "wide", BLUE, true);
+    show_preview(&mut ui, "wide", BLUE, true);
     end(&mut ui, false, 1.0, 1.0);
     save(&mut ui, "camera.fov = 44\nrender.output = \"other.png\"");
     read(&mut ui);
-    shown(&mut ui, "wide", BLUE, true);
+    show_preview(&mut ui, "wide", BLUE, true);
     let generation = ui.state.request.generation;
     let mut event = done(generation, Vec::new(), false);
     if let protocol::Event::Done { report, .. } = &mut event {
@@ -136,7 +136,7 @@ fn resumed_render_counts_all_its_time() {
     ui.press('r');
     read(&mut ui);
     preview(&mut ui, "first", BLUE, false);
-    typo(&mut ui);
+    save_broken_scene(&mut ui);
     preview(&mut ui, "first", GREEN, false);
     save(&mut ui, "a = 1");
     read(&mut ui);
@@ -154,7 +154,7 @@ fn resumed_render_counts_all_its_time() {
 }
 
 /// Shows a preview on the terminal.
-fn shown(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
+fn show_preview(ui: &mut TestUi, name: &str, color: [u8; 3], is_finished: bool) {
     preview(ui, name, color, is_finished);
     let generation = ui.state.request.generation;
     ui.event(Event::Shown { generation });
@@ -175,9 +175,9 @@ fn typo_during_a_render() -> TestUi {
     ui.finish(RED);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
-    shown(&mut ui, "dull", BLUE, false);
-    typo(&mut ui);
-    shown(&mut ui, "dull", GREEN, false);
+    show_preview(&mut ui, "dull", BLUE, false);
+    save_broken_scene(&mut ui);
+    show_preview(&mut ui, "dull", GREEN, false);
     ui
 }
 
@@ -196,7 +196,7 @@ fn last_good_render_is_counted_once() {
     last_good(&mut ui, FINISHED);
     assert_eq!(ui.state.work.renders, 2);
     // The last preview arrives after the end of the render.
-    shown(&mut ui, "dull", BLUE, true);
+    show_preview(&mut ui, "dull", BLUE, true);
     newest(&mut ui);
     for key in ['n', 'N'] {
         ui.press(key);
@@ -204,13 +204,13 @@ fn last_good_render_is_counted_once() {
     newest(&mut ui);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
-    shown(&mut ui, "dull", BLUE, true);
+    show_preview(&mut ui, "dull", BLUE, true);
     end(&mut ui, true, 0.0, 1.0);
     newest(&mut ui);
     assert!(ui.text().contains("unchanged · render 2"), "{}", ui.text());
     save(&mut ui, "shininess = 5");
     read(&mut ui);
-    shown(&mut ui, "duller", RED, true);
+    show_preview(&mut ui, "duller", RED, true);
     end(&mut ui, false, 1.0, 1.0);
     ui.press('n');
     assert!(ui.text().contains(&format!("{}, 0 s ago", messages::render_of(2, 3))), "{}", ui.text());
@@ -229,17 +229,17 @@ fn changed_last_good_render_has_a_number() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     read(&mut ui);
-    shown(&mut ui, "bright", RED, true);
+    show_preview(&mut ui, "bright", RED, true);
     end(&mut ui, false, 1.0, 1.0);
-    typo(&mut ui);
-    shown(&mut ui, "bright", RED, true);
+    save_broken_scene(&mut ui);
+    show_preview(&mut ui, "bright", RED, true);
     last_good(&mut ui, LastGoodEnd::Finished { unchanged: true });
     assert_eq!((ui.state.picture.history.len(), ui.state.work.renders), (1, 1));
     for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
         ui.press('s');
         ui.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
         for is_finished in [false, true] {
-            shown(&mut ui, name, [7, run, u8::from(is_finished)], is_finished);
+            show_preview(&mut ui, name, [7, run, u8::from(is_finished)], is_finished);
             assert!(ui.text().contains(&format!("▸{run} {words}")), "{}", ui.text());
             assert!(ui.text().contains(&format!(" 1 {}", messages::OPENED)), "{}", ui.text());
         }
@@ -258,7 +258,7 @@ fn complete_image_is_not_called_stopped() {
     ui.press('s');
     read(&mut ui);
     // All samples exist, but the next key comes before the end of the request.
-    shown(&mut ui, "hard", GREEN, true);
+    show_preview(&mut ui, "hard", GREEN, true);
     ui.press('s');
     ui.finish(BLUE);
     ui.press('n');
@@ -311,21 +311,21 @@ fn age_counts_from_the_last_improvement() {
     let mut ui = TestUi::with(state(120, 40));
     save(&mut ui, "shininess = 60");
     read(&mut ui);
-    shown(&mut ui, "bright", RED, false);
+    show_preview(&mut ui, "bright", RED, false);
     ui.wait(8000);
     end(&mut ui, false, 8.0, 8.0);
     ui.wait(3000);
     // Showing it again, for example at another size, does not change its age.
-    shown(&mut ui, "bright", GREEN, true);
+    show_preview(&mut ui, "bright", GREEN, true);
     save(&mut ui, "shininess = 6");
     read(&mut ui);
-    shown(&mut ui, "dull", BLUE, false);
+    show_preview(&mut ui, "dull", BLUE, false);
     ui.wait(2000);
     ui.press('n');
     assert!(ui.text().contains(&format!("{}, 5 s ago", messages::render_of(1, 2))), "{}", ui.text());
     // The same holds for a stopped render.
     ui.press('N');
-    shown(&mut ui, "dull", GREEN, false);
+    show_preview(&mut ui, "dull", GREEN, false);
     ui.wait(4000);
     ui.press('s');
     ui.wait(1000);

@@ -230,7 +230,7 @@ fn unanswered_writes_are_known_at_exit() {
     assert!(!ui.state.saving.is_write_requested);
 }
 
-fn wrong(message: &str) -> Vec<Diagnostic> {
+fn error_with(message: &str) -> Vec<Diagnostic> {
     vec![diagnostic(Severity::Error, message)]
 }
 
@@ -239,12 +239,12 @@ fn errors_in_incomplete_files_are_held_back() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(wrong("half"));
+    ui.fail(error_with("half"));
     let text = ui.text();
     assert!(!text.contains("half") && !text.contains("broken"), "{text}");
     assert!(text.contains("… waiting") && text.contains(messages::INCOMPLETE_FILE), "{text}");
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(wrong("more"));
+    ui.fail(error_with("more"));
     assert!(!ui.text().contains("more") && !ui.text().contains("broken"));
     assert!(ui.event(Event::Settled).is_empty());
     let text = ui.text();
@@ -257,7 +257,7 @@ fn file_written_in_pieces_shows_no_error() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(wrong("half"));
+    ui.fail(error_with("half"));
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.finish(BLUE);
     ui.event(Event::Settled);
@@ -270,14 +270,14 @@ fn file_written_in_pieces_shows_no_error() {
 #[test]
 fn errors_in_stable_files_are_immediate() {
     let mut ui = TestUi::new();
-    ui.fail(wrong("first"));
+    ui.fail(error_with("first"));
     assert!(ui.text().contains("error: first"), "no save");
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     ui.event(Event::Settled);
-    ui.fail(wrong("late"));
+    ui.fail(error_with("late"));
     assert!(ui.text().contains("error: late"));
     ui.press('r');
-    ui.fail(wrong("again"));
+    ui.fail(error_with("again"));
     assert!(ui.text().contains("error: again"));
 }
 
@@ -285,11 +285,11 @@ fn errors_in_stable_files_are_immediate() {
 fn errors_do_not_wait_for_a_lost_watcher() {
     let mut ui = TestUi::new();
     ui.event(Event::Changed(Changed { noticed: ui.now }));
-    ui.fail(wrong("half"));
+    ui.fail(error_with("half"));
     ui.event(Event::Lost(EventSource::Watcher));
     assert!(ui.text().contains("error: half"), "{}", ui.text());
     ui.press('r');
-    ui.fail(wrong("again"));
+    ui.fail(error_with("again"));
     assert!(ui.text().contains("error: again"));
 }
 

@@ -90,7 +90,7 @@ impl SimulatedTerminal {
     }
 
     /// Shows the bytes that have arrived.
-    fn pass(&mut self, now: Instant) {
+    fn deliver(&mut self, now: Instant) {
         while let Some((_, bytes)) = self.arriving.pop_front_if(|(when, _)| *when <= now) {
             self.cells.process(&bytes);
             self.pixels.take(&bytes);
@@ -105,7 +105,7 @@ impl SimulatedTerminal {
     }
 
     /// The colors of all parts of cells, or of the pixels.
-    fn seen(&self) -> Vec<[u8; 3]> {
+    fn visible_colors(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
         }
@@ -234,7 +234,7 @@ impl WatchedRender {
             let now = self.ui.now;
             self.presenter.draw_if_due(&mut self.ui.state, now);
             for event in self.presenter.pump(&self.ui.state, now, || false) {
-                self.happen(event);
+                self.send_event(event);
             }
             for bytes in std::mem::take(&mut *self.outbox.borrow_mut()) {
                 self.presenter.display.written(bytes.len());
@@ -245,7 +245,7 @@ impl WatchedRender {
             let next = [wake, work, self.terminal.next()].into_iter().flatten().min().unwrap_or(end);
             if next >= end {
                 self.ui.now = end;
-                self.terminal.pass(end);
+                self.terminal.deliver(end);
                 return;
             }
             self.ui.now = next.max(now);
@@ -256,7 +256,7 @@ impl WatchedRender {
     /// Handles all events that are due.
     fn events(&mut self, is_at_work: bool) {
         let now = self.ui.now;
-        self.terminal.pass(now);
+        self.terminal.deliver(now);
         while let Some((_, answer)) = self.terminal.answers.pop_front_if(|(when, _)| *when <= now) {
             self.presenter.display.answered(answer, now);
         }
@@ -292,11 +292,11 @@ impl WatchedRender {
             source: None,
         });
         if let Some(event) = self.presenter.preview(generation, &self.ui.state, self.ui.now) {
-            self.happen(event);
+            self.send_event(event);
         }
     }
 
-    fn happen(&mut self, event: Event) {
+    fn send_event(&mut self, event: Event) {
         self.shown += usize::from(matches!(event, Event::Shown { .. }));
         self.ui.event(event);
     }
@@ -322,7 +322,7 @@ fn picture((width, height): (u32, u32), samples: f64, turn: u32) -> Picture {
 }
 
 /// Mean difference of two screens in codes of 255.
-fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
+fn mean_difference(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
     assert!(!b.is_empty() && a.len() == b.len(), "{} and {} parts", a.len(), b.len());
     let all = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(a.abs_diff(*b)));
     all.sum::<f64>() / (3 * a.len()) as f64
@@ -338,13 +338,13 @@ fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
     let mut watch = WatchedRender::new(FAST, preview, depth);
     let screens = MAX.map(|(fraction, _)| {
         watch.until(fraction);
-        watch.terminal.seen()
+        watch.terminal.visible_colors()
     });
     watch.until(1.0);
     let pictures = watch.shown;
     watch.finish();
     for ((fraction, most), screen) in MAX.into_iter().zip(&screens) {
-        let apart = apart(screen, &watch.terminal.seen());
+        let apart = mean_difference(screen, &watch.terminal.visible_colors());
         assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: {apart} codes");
     }
     assert!((45..=105).contains(&pictures), "{preview:?}, {depth:?}: {pictures} in 10 s");
@@ -378,9 +378,9 @@ fn slow_connection_gets_few_previews() {
     let sent = watch.terminal.sent;
     assert!(sent <= 300_000, "{sent} bytes");
     assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
-    let before = watch.terminal.seen();
+    let before = watch.terminal.visible_colors();
     watch.finish();
-    let apart = apart(&before, &watch.terminal.seen());
+    let apart = mean_difference(&before, &watch.terminal.visible_colors());
     assert!(apart > 0.5 && apart < 4.0, "{apart} codes: only the last preview is exact");
 }
 

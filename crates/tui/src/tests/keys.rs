@@ -29,7 +29,7 @@ fn every_key_has_its_effect() {
 }
 
 /// The camera pose that a key requests.
-fn moved(effects: &[Effect]) -> Pose {
+fn requested_pose(effects: &[Effect]) -> Pose {
     request(effects).and_then(|it| it.overrides.camera.pose).expect("a request with a camera")
 }
 
@@ -84,7 +84,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(ui.text().contains(&messages::view(wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
-            let moved = moved(&ui.key(key)).position - DVec3::Y;
+            let moved = requested_pose(&ui.key(key)).position - DVec3::Y;
             let expected = match action {
                 Action::OrbitLeft => -DVec3::X,
                 Action::OrbitRight => DVec3::X,
@@ -94,7 +94,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
             assert!(moved.dot(expected) > 0.1 && (moved.length() - 4.0).abs() < 1e-3, "{moved}");
         }
         Action::DollyIn | Action::DollyOut => {
-            let distance = moved(&ui.key(key)).distance();
+            let distance = requested_pose(&ui.key(key)).distance();
             assert_eq!(distance < 4.0, action == Action::DollyIn);
             assert_ne!(distance, 4.0);
         }
@@ -111,7 +111,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 Some((Some(stops), Writing::No))
             );
             assert!(
-                ui.text().contains(&messages::exposure(&crate::state::signed_stops(stops))),
+                ui.text().contains(&messages::exposure(&crate::state::format_stops(stops))),
                 "{}",
                 ui.text()
             );

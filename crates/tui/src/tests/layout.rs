@@ -17,7 +17,7 @@ const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const SIZES: [(u32, u32); 4] = [(640, 480), (1280, 720), (640, 400), (512, 512)];
 
 /// The preview of an image of this size, within the requested size.
-fn previewed(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
+fn fitted_preview_size(size: (u32, u32), most: PreviewSize) -> (u32, u32) {
     let scale = (f64::from(most.width) / f64::from(size.0)).min(f64::from(most.height) / f64::from(size.1));
     let side = |length: u32, most: u32| ((f64::from(length) * scale).round() as u32).clamp(1, most);
     (side(size.0, most.width), side(size.1, most.height))
@@ -40,7 +40,7 @@ fn rendered(ui: &mut TestUi, (width, height): (u32, u32)) {
 
 fn show(ui: &mut TestUi, size: (u32, u32)) {
     let generation = ui.state.request.generation;
-    let (width, height) = previewed(size, ui.state.request.preview_size.expect("a preview"));
+    let (width, height) = fitted_preview_size(size, ui.state.request.preview_size.expect("a preview"));
     let picture = plain_picture(width, height, RED);
     ui.event(Event::Picture {
         generation,
@@ -53,7 +53,7 @@ fn show(ui: &mut TestUi, size: (u32, u32)) {
 }
 
 /// Cells of the largest image that fits in a window with one line of text.
-fn most_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
+fn max_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
     let shape = f64::from(width) / f64::from(height) * 2.0;
     let room = (f64::from(columns), f64::from(rows - 1));
     let columns = room.0.min((room.1 * shape).round());
@@ -64,7 +64,7 @@ fn most_cells((columns, rows): (u16, u16), (width, height): (u32, u32)) -> f64 {
 fn image_gets_most_of_the_space() {
     for window in WINDOWS {
         for size in SIZES {
-            let most = most_cells(window, size);
+            let most = max_cells(window, size);
             let mut ui = TestUi::with(state(window.0, window.1));
             rendered(&mut ui, size);
             let share = cells_of(&mut ui, RED) as f64 / most;
@@ -155,7 +155,7 @@ fn small_windows_are_usable() {
         ui.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(4567.0)) });
         assert!(ui.text().contains("50 %"), "progress takes precedence over ETA: {}", ui.text());
         rendered(&mut ui, (640, 480));
-        let share = cells_of(&mut ui, RED) as f64 / most_cells((columns, rows), (640, 480));
+        let share = cells_of(&mut ui, RED) as f64 / max_cells((columns, rows), (640, 480));
         assert!(share >= 0.7, "{share:.3}\n{}", ui.text());
         ui.fail(vec![diagnostic(Severity::Error, "misspelled")]);
         let text = ui.text();

@@ -20,7 +20,7 @@ fn half_done(window: (u16, u16), notice: &str) -> TestUi {
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
     ui.worker(protocol::Event::Progress { generation, progress: progress(0.5, Some(2.0)) });
-    crate::update::say(&mut ui.state, notice);
+    crate::update::show_notice(&mut ui.state, notice);
     ui
 }
 
@@ -86,7 +86,7 @@ fn notice_does_not_hide_the_written_file() {
                 is_own: true,
             });
             ui.finish(RED);
-            crate::update::say(&mut ui.state, notice);
+            crate::update::show_notice(&mut ui.state, notice);
             assert!(ui.text().contains("→ cornell.png"), "{window:?} {}", ui.text());
         }
     }

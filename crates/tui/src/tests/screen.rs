@@ -486,7 +486,7 @@ fn unwritten_image_is_not_done() {
 }
 
 /// The screen below the header, in one line.
-fn below(ui: &mut TestUi) -> String {
+fn text_below_header(ui: &mut TestUi) -> String {
     let text = ui.text();
     let words = text.lines().skip(1).flat_map(str::split_whitespace);
     words.filter(|word| !word.starts_with('▀')).collect::<Vec<_>>().join(" ")
@@ -509,25 +509,33 @@ fn files_of_other_images_are_not_listed() {
         };
         ui.worker(written(1));
         ui.finish(super::RED);
-        assert!(below(&mut ui).contains("→ a.png"), "{}", ui.text());
+        assert!(text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
         // The next image cannot be written, so the file contains the previous one.
         ui.event(Event::Changed(crate::Changed { noticed: ui.now }));
         ui.worker(protocol::Event::Started { generation: 2 });
         ui.worker(failed(2, "a.png: denied"));
         ui.worker(done(2, Vec::new(), false));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-        assert!(!below(&mut ui).contains("→ a.png"), "{}", ui.text());
+        assert!(!text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
         // Writing works again.
         ui.press('w');
         ui.worker(written(2));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-        assert!(below(&mut ui).contains("→ a.png") && !ui.text().contains("unwritten"), "{}", ui.text());
+        assert!(
+            text_below_header(&mut ui).contains("→ a.png") && !ui.text().contains("unwritten"),
+            "{}",
+            ui.text()
+        );
         // Another write requested with a key fails, so the content is unknown.
         ui.press('w');
         ui.worker(failed(2, "a.png: gone"));
         ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
         let first = ui.text().lines().next().map(str::to_owned).unwrap_or_default();
-        assert!(first.contains("! unwritten") && !below(&mut ui).contains("→ a.png"), "{}", ui.text());
+        assert!(
+            first.contains("! unwritten") && !text_below_header(&mut ui).contains("→ a.png"),
+            "{}",
+            ui.text()
+        );
         ui.press('e');
         assert!(ui.text().contains("a.png: gone"), "{}", ui.text());
         let words = "not written: a.png: gone; before that, wrote a.png";
@@ -545,7 +553,7 @@ fn failed_write_during_a_render_is_not_final() {
     ui.worker(protocol::Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
     ui.finish(super::RED);
     ui.key(KeyPress::special(crossterm::event::KeyCode::Esc));
-    assert!(ui.text().contains("✓ done") && below(&mut ui).contains("→ a.png"), "{}", ui.text());
+    assert!(ui.text().contains("✓ done") && text_below_header(&mut ui).contains("→ a.png"), "{}", ui.text());
 }
 
 #[test]

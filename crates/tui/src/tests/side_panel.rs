@@ -148,7 +148,7 @@ fn history_lists_changes_and_opens_on_click() {
 }
 
 /// Saves the scene and starts its render, which shows a preview if there is a color.
-fn begun(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
+fn start_render(ui: &mut TestUi, text: &str, color: Option<[u8; 3]>) {
     ui.event(Event::Changed(Changed { noticed: ui.now }));
     let generation = ui.state.request.generation;
     ui.worker(protocol::Event::Started { generation });
@@ -178,7 +178,7 @@ fn show(ui: &mut TestUi, color: [u8; 3]) {
 fn preview_does_not_wait_for_the_history() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
-    begun(&mut ui, "camera.fov = 30", None);
+    start_render(&mut ui, "camera.fov = 30", None);
     let (generation, before) = (ui.state.request.generation, ui.state.picture.history.len());
     let picture = plain_picture(50, 38, BLUE);
     ui.event(Event::Picture {
@@ -200,14 +200,14 @@ fn preview_does_not_wait_for_the_history() {
 /// Color of the newest thumbnail.
 fn small_color(ui: &TestUi) -> [u8; 3] {
     let history = &ui.state.picture.history;
-    history.small(history.len() - 1).expect("a thumbnail").pixels[0]
+    history.thumbnail(history.len() - 1).expect("a thumbnail").pixels[0]
 }
 
 #[test]
 fn entry_gets_the_preview_after_the_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
-    begun(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
+    start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
     // The last preview is taken from its slot when there is bandwidth for it.
     ui.worker(done(generation, Vec::new(), false));
@@ -226,7 +226,7 @@ fn entry_gets_the_preview_after_the_end() {
 fn hidden_entry_gets_the_preview_after_the_end() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
-    begun(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
+    start_render(&mut ui, "camera.fov = 30", Some([0, 0, 0]));
     let generation = ui.state.request.generation;
     ui.press('n');
     ui.worker(done(generation, Vec::new(), false));
@@ -252,7 +252,7 @@ fn actual_pixels_are_not_a_thumbnail() {
 fn running_render_is_the_newest_entry() {
     let mut ui = TestUi::with(state(120, 40));
     edited(&mut ui, &[("camera.fov = 40", RED)]);
-    begun(&mut ui, "camera.fov = 30", Some(BLUE));
+    start_render(&mut ui, "camera.fov = 30", Some(BLUE));
     let text = panel(&mut ui);
     assert!(
         text.contains("▸2 camera.fov 40 → 30") && text.contains(&format!(" 1 {}", messages::OPENED)),
@@ -260,7 +260,7 @@ fn running_render_is_the_newest_entry() {
     );
     assert!(!text.contains(messages::STOPPED), "not stopped: {text}");
     // The next save stops it. The stopped render stays without a number until the new one has a preview.
-    begun(&mut ui, "camera.fov = 20", None);
+    start_render(&mut ui, "camera.fov = 20", None);
     let text = panel(&mut ui);
     assert!(text.contains(&format!("▸– {}: camera.fov", messages::STOPPED)) && !text.contains('2'), "{text}");
     show(&mut ui, [10, 200, 20]);
@@ -281,7 +281,7 @@ fn running_render_is_the_newest_entry() {
     ui.worker(done(generation, Vec::new(), false));
     ui.press('n');
     let before = ui.state.picture.history.len();
-    begun(&mut ui, "camera.fov = 10", None);
+    start_render(&mut ui, "camera.fov = 10", None);
     ui.press('n');
     ui.press('n');
     show(&mut ui, [90, 90, 20]);
@@ -458,7 +458,7 @@ fn written_files_are_hyperlinks() {
 }
 
 /// Ends a render after this many seconds. Returns what is sent after the preview.
-fn told(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
+fn notification(seconds: u64, prepare: impl Fn(&mut TestUi)) -> Option<String> {
     let mut ui = TestUi::new();
     ui.state.display.capabilities = TerminalId { brand: Brand::Kitty, version: [0, 40] }.capabilities();
     prepare(&mut ui);
@@ -476,11 +476,11 @@ fn end_of_a_long_render_is_notified() {
         move |ui: &mut TestUi| drop(ui.event(Event::TerminalReply(TerminalReply::Focus { is_here })))
     };
     let words = "\u{1b}]99;;glimt: cornell.toml: done after 31.0 s\u{1b}\\";
-    assert_eq!(told(31, focus(false)).as_deref(), Some(words));
-    assert_eq!(told(30, focus(false)), None);
-    assert_eq!(told(31, focus(true)), None);
-    assert_eq!(told(31, |_| {}), None, "the terminal never reported a loss of focus");
-    assert_eq!(told(31, |ui| ui.state.display.has_focus = true), None);
+    assert_eq!(notification(31, focus(false)).as_deref(), Some(words));
+    assert_eq!(notification(30, focus(false)), None);
+    assert_eq!(notification(31, focus(true)), None);
+    assert_eq!(notification(31, |_| {}), None, "the terminal never reported a loss of focus");
+    assert_eq!(notification(31, |ui| ui.state.display.has_focus = true), None);
     // A pause does not count.
     let held = |ui: &mut TestUi| {
         focus(false)(ui);
@@ -488,10 +488,10 @@ fn end_of_a_long_render_is_notified() {
         ui.wait(60_000);
         ui.key(KeyPress::plain(' '));
     };
-    assert_eq!(told(5, held), None);
+    assert_eq!(notification(5, held), None);
     let never = |ui: &mut TestUi| {
         focus(false)(ui);
         ui.state.display.notify_after = None;
     };
-    assert_eq!(told(100, never), None);
+    assert_eq!(notification(100, never), None);
 }

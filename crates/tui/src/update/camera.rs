@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::notices::{notify, prompt, say};
+use super::notices::{notify, prompt, show_notice};
 use super::request::render;
 use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
@@ -13,7 +13,7 @@ use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
-use crate::state::{State, signed_stops};
+use crate::state::{State, format_stops};
 
 /// Degrees per orbit step.
 const TURN: f64 = 3.0;
@@ -31,12 +31,12 @@ const MAX_STOPS: f32 = 20.0;
 
 /// Orbits by a number of steps to the right and up.
 pub(super) fn orbit(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    turn(state, right * TURN, up * TURN)
+    orbit_by(state, right * TURN, up * TURN)
 }
 
 /// Orbits by an angle in degrees to the right and up.
-pub(super) fn turn(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
-    moved(state, |pose| orbited(pose, right, up))
+pub(super) fn orbit_by(state: &mut State, right: f64, up: f64) -> Vec<Effect> {
+    move_camera(state, |pose| orbited(pose, right, up))
 }
 
 /// Moves closer by a number of steps.
@@ -48,7 +48,7 @@ pub(super) fn dolly(state: &mut State, steps: f64) -> Vec<Effect> {
     if pose == view.pose {
         return notify(state, if steps > 0.0 { messages::CLOSEST } else { messages::FARTHEST });
     }
-    moved(state, |_| pose)
+    move_camera(state, |_| pose)
 }
 
 /// Widens the field of view by a number of steps.
@@ -63,21 +63,21 @@ pub(super) fn zoom(state: &mut State, steps: f64) -> Vec<Effect> {
 }
 
 /// Raises the exposure by a number of steps.
-pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
+pub(super) fn change_exposure(state: &mut State, steps: f32) -> Vec<Effect> {
     let Some(scene) = state.request.exposure else { return unknown(state) };
     let own = state.request.command_line.exposure.unwrap_or(scene);
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MAX_STOPS).min(before), MAX_STOPS.max(before));
     if stops == before {
-        return notify(state, &messages::exposure_limit(&signed_stops(stops)));
+        return notify(state, &messages::exposure_limit(&format_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
-    say(state, messages::exposure(&signed_stops(stops)));
+    show_notice(state, messages::exposure(&format_stops(stops)));
     effects
 }
 
-fn moved(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
+fn move_camera(state: &mut State, how: impl FnOnce(&Pose) -> Pose) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     state.request.toggles.camera.pose = Some(how(&view.pose));
     camera_step(state)
@@ -90,7 +90,7 @@ fn unknown(state: &mut State) -> Vec<Effect> {
 pub(super) fn camera_step(state: &mut State) -> Vec<Effect> {
     drop_restored_values(state);
     let effects = step(state);
-    say(
+    show_notice(
         state,
         if state.request.toggles.camera.is_any() { messages::CAMERA_MOVED } else { messages::CAMERA_RESET },
     );
@@ -160,7 +160,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         effects = render(state, false);
     }
     state.saving.camera_kept = is_new.then_some(state.now);
-    say(state, words + which);
+    show_notice(state, words + which);
     effects
 }
 
@@ -187,7 +187,7 @@ pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec
     let effects = render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = visible(&path.to_string_lossy()).into_owned();
-    say(state, messages::undone(&name));
+    show_notice(state, messages::undone(&name));
     effects
 }
 

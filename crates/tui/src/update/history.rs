@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::notices::{notify, say, say_until_key};
+use super::notices::{notify, show_notice, show_until_key};
 use crate::event::Effect;
 use crate::messages;
 use crate::state::{Rendering, State};
@@ -39,7 +39,7 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
         return close(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.step(steps, newest) {
-        Some(shown) => look_at(state, shown),
+        Some(shown) => show_image(state, shown),
         None => notify(state, if steps > 0 { messages::OLDEST_RENDER } else { messages::NEWEST_RENDER }),
     }
 }
@@ -52,7 +52,7 @@ pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
         return close(state, messages::NEWEST_RENDER);
     }
     match state.picture.history.open_at(at, newest) {
-        Some(shown) => look_at(state, shown),
+        Some(shown) => show_image(state, shown),
         None => Vec::new(),
     }
 }
@@ -66,10 +66,10 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
     let Some(newest) = newest(state) else { return notify(state, messages::NO_IMAGE) };
     match state.picture.history.open_before_edit(newest) {
         Some(shown) => {
-            let effects = look_at(state, shown);
+            let effects = show_image(state, shown);
             let edits = state.picture.history.edits_since_open();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
-            say_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
+            show_until_key(state, format!("{}{edits}", messages::BEFORE_EDIT));
             effects
         }
         None => notify(state, messages::NO_EARLIER_RENDER),
@@ -80,7 +80,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
 pub(super) fn close(state: &mut State, words: &str) -> Vec<Effect> {
     if let Some(newest) = state.picture.history.close() {
         state.picture.shown = Some(newest);
-        say(state, words);
+        show_notice(state, words);
     }
     Vec::new()
 }
@@ -89,11 +89,11 @@ fn newest(state: &State) -> Option<crate::history::ShownImage> {
     if state.picture.history.is_open() { state.picture.history.newest() } else { state.picture.shown.clone() }
 }
 
-fn look_at(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
+fn show_image(state: &mut State, shown: crate::history::ShownImage) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The header shows which render it is and how old.
     let keys = &messages::HISTORY_KEYS[usize::from(state.picture.history.is_oldest_open())..];
     let words = [&[&*state.picture.history.reason_of_open()], keys].concat().join(" · ");
-    say_until_key(state, words);
+    show_until_key(state, words);
     Vec::new()
 }

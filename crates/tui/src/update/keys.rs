@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::{notify, say};
+use super::notices::{notify, show_notice};
 use super::request::{render, resized_preview};
 use super::views::choose_view;
 use super::{camera, edit_position, history, overlay, pointer, region};
@@ -55,8 +55,8 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::DollyOut => camera::dolly(state, -1.0),
         Action::NarrowField => camera::zoom(state, -1.0),
         Action::WidenField => camera::zoom(state, 1.0),
-        Action::Darken => camera::expose(state, -1.0),
-        Action::Brighten => camera::expose(state, 1.0),
+        Action::Darken => camera::change_exposure(state, -1.0),
+        Action::Brighten => camera::change_exposure(state, 1.0),
         Action::KeepCamera => camera::keep(state),
         Action::UndoCamera => camera::undo(state),
         Action::Inspect => pointer::inspect(state),
@@ -75,7 +75,7 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::ToggleHelp => change(state, |state| {
             state.overlays.help = Pane { open: !state.overlays.help.open, ..Pane::default() }
         }),
-        Action::ShowImageOnly => picture_alone(state),
+        Action::ShowImageOnly => show_image_only(state),
         Action::Redraw => vec![Effect::Redraw],
         Action::Suspend => vec![Effect::StopJob],
         Action::Interrupt => vec![Effect::Quit(ExitStatus::INTERRUPTED)],
@@ -153,7 +153,7 @@ fn step_view(state: &mut State, steps: usize) -> Vec<Effect> {
     choose_view(state, View::ALL[(current + steps) % View::ALL.len()])
 }
 
-fn picture_alone(state: &mut State) -> Vec<Effect> {
+fn show_image_only(state: &mut State) -> Vec<Effect> {
     match state.display.kind {
         PreviewKind::None => return notify(state, messages::NO_PREVIEW),
         PreviewKind::HalfBlock
@@ -177,7 +177,7 @@ fn close_up(state: &mut State) -> Vec<Effect> {
     state.picture.close_up =
         if state.picture.close_up.is_some() { None } else { Some(state.selection.crosshair) };
     match state.picture.close_up {
-        Some(_) => say(state, messages::ACTUAL_PIXELS),
+        Some(_) => show_notice(state, messages::ACTUAL_PIXELS),
         None => state.overlays.message = None,
     }
     state.dirty = true;
@@ -195,7 +195,7 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
 
 fn write_now(state: &mut State) -> Vec<Effect> {
     let is_open = state.picture.history.is_open();
-    say(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
+    show_notice(state, if is_open { messages::WRITING_NEWEST } else { messages::WRITING });
     (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
     vec![Effect::Send(Command::Write)]
 }
@@ -206,7 +206,7 @@ fn scene_settings(state: &mut State) -> Vec<Effect> {
     }
     state.request.toggles = Toggles::default();
     let effects = render(state, false);
-    say(state, messages::RESET);
+    show_notice(state, messages::RESET);
     effects
 }
 

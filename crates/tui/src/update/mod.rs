@@ -15,8 +15,8 @@ mod worker;
 
 use std::time::{Duration, Instant};
 
-pub(super) use self::notices::say;
-use self::notices::say_until_key;
+pub(super) use self::notices::show_notice;
+use self::notices::show_until_key;
 use self::request::{render, resized_preview};
 use super::ExitStatus;
 use super::event::{Effect, Event, EventSource, Signal, Window};
@@ -47,7 +47,7 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     if was_paused && effects.iter().any(is_request) {
         let message = state.overlays.message.take();
         let rest = message.map_or(String::new(), |message| format!(" · {}", message.words));
-        say(state, format!("{}{rest}", messages::RESUMED));
+        show_notice(state, format!("{}{rest}", messages::RESUMED));
     }
     effects
 }
@@ -94,15 +94,15 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             effects
         }
         Event::Settled => {
-            worker::settled(state);
+            worker::show_delayed_errors(state);
             Vec::new()
         }
         Event::Output(change) => worker::output_changed(state, &change),
-        Event::Signal(signal) => vec![signalled(signal)],
+        Event::Signal(signal) => vec![effect_of_signal(signal)],
         Event::Shown { generation } => {
             // Show the preview first, then update the history.
             history::record_newest(state);
-            shown(state, generation)
+            handle_first_change(state, generation)
         }
         Event::Tick => tick(state),
         Event::Lost(source) => lost(state, source),
@@ -111,11 +111,11 @@ fn handle(state: &mut State, event: Event) -> Vec<Effect> {
             Vec::new()
         }
         Event::NoEditor(why) => {
-            say_until_key(state, why);
+            show_until_key(state, why);
             Vec::new()
         }
         Event::NoShell => {
-            say(state, messages::NO_SHELL);
+            show_notice(state, messages::NO_SHELL);
             Vec::new()
         }
     }
@@ -166,7 +166,7 @@ fn is_whole(picture: &Picture) -> bool {
             .is_ok_and(|pixels| pixels == u64::from(picture.width) * u64::from(picture.height))
 }
 
-fn shown(state: &mut State, generation: u64) -> Vec<Effect> {
+fn handle_first_change(state: &mut State, generation: u64) -> Vec<Effect> {
     if let Some(change) = state.saving.change.take_if(|change| change.generation == generation) {
         state.saving.first_change = Some(state.now.saturating_duration_since(change.noticed));
         state.dirty = true;
@@ -200,7 +200,7 @@ fn tick(state: &mut State) -> Vec<Effect> {
     resized_preview(state)
 }
 
-fn signalled(signal: Signal) -> Effect {
+fn effect_of_signal(signal: Signal) -> Effect {
     match signal {
         Signal::Interrupt => Effect::Quit(ExitStatus::INTERRUPTED),
         Signal::Terminate => Effect::Quit(ExitStatus::TERMINATED),
@@ -217,8 +217,8 @@ fn lost(state: &mut State, source: EventSource) -> Vec<Effect> {
     match source {
         EventSource::Worker => vec![Effect::GiveUp],
         EventSource::Watcher => {
-            worker::settled(state);
-            say_until_key(state, messages::NOT_WATCHING);
+            worker::show_delayed_errors(state);
+            show_until_key(state, messages::NOT_WATCHING);
             Vec::new()
         }
         EventSource::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],

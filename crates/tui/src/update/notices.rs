@@ -9,13 +9,13 @@ use crate::state::{Message, State};
 const NOTICE: Duration = Duration::from_secs(4);
 
 /// Shows a notice until the next key, for at most four seconds.
-pub(crate) fn say(state: &mut State, words: impl Into<String>) {
+pub(crate) fn show_notice(state: &mut State, words: impl Into<String>) {
     let until = Some(state.now + NOTICE);
     show(state, Message { words: words.into(), until });
 }
 
 /// Shows an error or a prompt until the next key.
-pub(super) fn say_until_key(state: &mut State, words: impl Into<String>) {
+pub(super) fn show_until_key(state: &mut State, words: impl Into<String>) {
     show(state, Message { words: words.into(), until: None });
 }
 
@@ -26,12 +26,12 @@ fn show(state: &mut State, message: Message) {
 
 /// Shows a notice; returns no effects.
 pub(super) fn notify(state: &mut State, words: &str) -> Vec<Effect> {
-    say(state, words);
+    show_notice(state, words);
     Vec::new()
 }
 
 /// Shows a message until the next key; returns no effects.
 pub(super) fn prompt(state: &mut State, words: &str) -> Vec<Effect> {
-    say_until_key(state, words);
+    show_until_key(state, words);
     Vec::new()
 }

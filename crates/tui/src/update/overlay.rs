@@ -14,10 +14,10 @@ use crate::view::{diagnostics, help};
 
 /// Handles a key. `None` if no open overlay uses it.
 pub(super) fn update(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
-    if let Some(effects) = views::typed(state, key) {
+    if let Some(effects) = views::handle_search_key(state, key) {
         return Some(effects);
     }
-    if let Some(view) = chosen(state, key) {
+    if let Some(view) = view_of_digit(state, key) {
         state.overlays.message = None;
         return Some(choose_view(state, view));
     }
@@ -45,7 +45,7 @@ pub(super) fn act(state: &mut State, action: OverlayAction) -> bool {
 }
 
 /// The view of a digit while the list of views is open.
-fn chosen(state: &State, key: KeyPress) -> Option<View> {
+fn view_of_digit(state: &State, key: KeyPress) -> Option<View> {
     let KeyCode::Char(digit @ '1'..='9') = key.code else { return None };
     state.overlays.views.as_ref().filter(|_| key.modifiers.is_empty())?;
     View::ALL.get(digit.to_digit(10)? as usize - 1).copied()

@@ -1,6 +1,6 @@
 //! The mouse and queries about a position in the image.
 
-use super::notices::{notify, prompt, say};
+use super::notices::{notify, prompt, show_notice};
 use super::{camera, history, overlay, region};
 use crate::event::FilePosition;
 use crate::event::{Effect, Mouse, MouseKind};
@@ -76,7 +76,7 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
     }
     state.selection.press = Some(Press { column: mouse.column, row: mouse.row, has_moved: true, ..press });
     let degrees = TURN_ACROSS / f64::from(Layout::of(state).preview.width.max(1));
-    camera::turn(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
+    camera::orbit_by(state, -right * degrees, down * f64::from(state.display.window.cell_aspect) * degrees)
 }
 
 fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
@@ -130,7 +130,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
     state.selection.is_mouse_on = !state.selection.is_mouse_on;
     (state.selection.press, state.selection.is_focusing, state.selection.is_marking) = (None, false, false);
     let words = if state.selection.is_mouse_on { messages::MOUSE_ON } else { messages::MOUSE_OFF };
-    say(state, words);
+    show_notice(state, words);
     vec![Effect::Mouse(state.selection.is_mouse_on)]
 }
 
@@ -147,7 +147,7 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
             let facts = facts(picked);
-            state.selection.clicked = Some(clicked(picked, &facts));
+            state.selection.clicked = Some(values_with_pixel(picked, &facts));
             state.selection.facts = Some(facts);
             state.dirty = true;
             Vec::new()
@@ -169,13 +169,13 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::camera_step(state);
     if state.request.toggles.camera.focus.is_some() {
-        say(state, messages::focus_moved(distance));
+        show_notice(state, messages::focus_moved(distance));
     }
     effects
 }
 
 /// The inspected values in one line, with the pixel.
-fn clicked(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
+fn values_with_pixel(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
     let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
     facts.join(" · ") + &pixel
 }
@@ -192,7 +192,7 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
         // The message shows the text so that it can be selected.
         return notify(state, &format!("{} {clicked}", messages::SELECT_TO_COPY));
     }
-    say(state, format!("{} {clicked}", messages::COPIED));
+    show_notice(state, format!("{} {clicked}", messages::COPIED));
     vec![Effect::Aside(window_title::copy(&clicked))]
 }
 

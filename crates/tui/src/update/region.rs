@@ -1,6 +1,6 @@
 //! The region of the image that is rendered first.
 
-use super::notices::{prompt, say};
+use super::notices::{prompt, show_notice};
 use super::request::render;
 use crate::event::Effect;
 use crate::messages;
@@ -16,7 +16,7 @@ pub(super) fn press(state: &mut State) -> Vec<Effect> {
     if state.request.first_section.take().is_some() {
         (state.selection.is_marking, state.selection.press) = (false, None);
         let effects = again(state);
-        say(state, messages::REGION_CLEARED);
+        show_notice(state, messages::REGION_CLEARED);
         return effects;
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
@@ -58,7 +58,7 @@ fn take(state: &mut State, section: Section) -> Vec<Effect> {
     state.request.first_section = Some(section);
     let words = if state.work.is_running() { messages::REGION_FIRST } else { messages::REGION_NEXT };
     let effects = again(state);
-    say(state, words);
+    show_notice(state, words);
     effects
 }
 

@@ -1,6 +1,6 @@
 //! Handles terminal replies about its capabilities.
 
-use super::notices::say_until_key;
+use super::notices::show_until_key;
 use super::request::resized_preview;
 use crate::color::{ColorDepth, ColorMapper};
 use crate::event::Effect;
@@ -94,7 +94,7 @@ fn check_pixel_support(state: &mut State, answer: TerminalReply) -> Vec<Effect> 
 pub(super) fn report_missing_pixels(state: &mut State) {
     let asked = state.display.pixels_until.take().and(state.display.pixels);
     if let Some(request) = asked {
-        say_until_key(state, request.refusal());
+        show_until_key(state, request.refusal());
     }
 }
 
@@ -147,7 +147,7 @@ mod tests {
     use crate::update::start;
 
     /// A user interface whose user requested kitty images.
-    fn wanting_pixels(route: ImageRoute) -> TestUi {
+    fn ui_requesting_pixels(route: ImageRoute) -> TestUi {
         let mut state = state(80, 24);
         let request = PixelRequest { protocol: Protocol::Kitty, route, is_known: false };
         state.display.pixels = Some(request);
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn pixels_are_drawn_once_confirmed() {
-        let mut ui = wanting_pixels(ImageRoute::Direct);
+        let mut ui = ui_requesting_pixels(ImageRoute::Direct);
         assert_eq!(ui.state.display.kind, PreviewKind::HalfBlock);
         let effects = ui.event(Event::TerminalReply(TerminalReply::Images(Protocol::Kitty)));
         assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn missing_pixel_support_is_reported_once() {
-        let mut ui = wanting_pixels(ImageRoute::Direct);
+        let mut ui = ui_requesting_pixels(ImageRoute::Direct);
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
         assert!(ui.text().contains("kitty images"), "{}", ui.text());
         let refusal = ui.state.display.pixels.map(PixelRequest::refusal);
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn closed_tmux_is_reported_after_a_second() {
-        let mut ui = wanting_pixels(ImageRoute::Tmux);
+        let mut ui = ui_requesting_pixels(ImageRoute::Tmux);
         ui.event(Event::TerminalReply(TerminalReply::Attributes));
         ui.wait(900);
         assert_eq!(ui.state.overlays.message, None);

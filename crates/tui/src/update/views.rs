@@ -2,7 +2,7 @@
 
 use crossterm::event::{KeyCode, KeyModifiers};
 
-use super::notices::say;
+use super::notices::show_notice;
 use super::request::render;
 use crate::choice::Choice;
 use crate::event::{Effect, KeyPress};
@@ -29,7 +29,7 @@ pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Eff
         OverlayAction::PageUp => 0,
         OverlayAction::PageDown => last,
         OverlayAction::Find => {
-            look_for(state, String::new());
+            search(state, String::new());
             return Some(Vec::new());
         }
         OverlayAction::Take => {
@@ -42,7 +42,7 @@ pub(super) fn update(state: &mut State, action: OverlayAction) -> Option<Vec<Eff
 }
 
 /// Handles a key while a name is typed. `None` if no search is active.
-pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
+pub(super) fn handle_search_key(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
     let is_held = key.modifiers.contains(KeyModifiers::CONTROL);
     match key.code {
@@ -54,8 +54,8 @@ pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
         }
         _ => return None,
     }
-    let found = found(&name);
-    look_for(state, name);
+    let found = find_view(&name);
+    search(state, name);
     Some(found.map_or_else(Vec::new, |view| choose(state, view)))
 }
 
@@ -68,20 +68,20 @@ pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
         let is_empty = view == View::Photons && !state.request.photons();
         let words =
             if is_empty { messages::VIEW_WITHOUT_PHOTONS.to_owned() } else { messages::view(view.name()) };
-        say(state, words);
+        show_notice(state, words);
     }
     effects
 }
 
 /// The first view whose name starts with `name`, else the first that contains it.
-fn found(name: &str) -> Option<View> {
+fn find_view(name: &str) -> Option<View> {
     let begins = |view: &&View| view.name().starts_with(name);
     let has = |view: &&View| view.name().contains(name);
     let all = || View::ALL.iter().filter(|_| !name.is_empty());
     all().find(begins).or_else(|| all().find(has)).copied()
 }
 
-fn look_for(state: &mut State, name: String) {
+fn search(state: &mut State, name: String) {
     state.list_views();
     if let Some(views) = &mut state.overlays.views {
         views.name = Some(name);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::notices::{say, say_until_key};
+use super::notices::{show_notice, show_until_key};
 use super::request::resized_preview;
 use super::{camera, history, pointer};
 use crate::event::{Effect, WriteFailure};
@@ -27,12 +27,12 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
         Event::WriteDone { paths, .. } => {
-            wrote(state, &paths);
+            report_written(state, &paths);
             return Vec::new();
         }
         // Images of earlier requests may still be written.
         Event::Written { path, bytes, generation, is_own } if generation != state.request.generation => {
-            note(state, path, bytes, (generation, is_own));
+            record_file(state, path, bytes, (generation, is_own));
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
@@ -60,7 +60,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             clear_problems(state);
             state.picture.history.read();
             if pinhole {
-                say(state, messages::PINHOLE);
+                show_notice(state, messages::PINHOLE);
             }
             // The size of the preview depends on the image's shape.
             return resized_preview(state);
@@ -68,7 +68,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => {
             if let Some(noise) = progress.noise {
-                state.work.curve.note(progress.earlier_seconds + noise.seconds, noise.now);
+                state.work.curve.record(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
             let is_rendering = OwnState::Begun { is_rendering: true };
@@ -97,42 +97,42 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             }
             let is_it = |written: &&mut WrittenFile| Some(&written.path) == path.as_ref();
             state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
-            say_until_key(state, format!("error: {}", visible(&message)));
+            show_until_key(state, format!("error: {}", visible(&message)));
             state.saving.write_failed =
                 Some(WriteFailure { why: message, generation: state.request.generation, is_refused: false });
         }
-        Event::NotKept { message, .. } => say_until_key(state, format!("warning: {}", visible(&message))),
+        Event::NotKept { message, .. } => show_until_key(state, format!("warning: {}", visible(&message))),
         Event::Checkpoint { news, .. } => match news {
             CheckpointNews::Failed { message } => {
-                say_until_key(state, format!("warning: {}", visible(&message)));
+                show_until_key(state, format!("warning: {}", visible(&message)));
             }
             CheckpointNews::Resumed { path, .. } => {
-                say(state, format!("{} {}", messages::RESUMING, visible(&path.to_string_lossy())));
+                show_notice(state, format!("{} {}", messages::RESUMING, visible(&path.to_string_lossy())));
             }
             CheckpointNews::SetAside { path } => {
-                say_until_key(state, messages::checkpoint_kept(&visible(&path.to_string_lossy())));
+                show_until_key(state, messages::checkpoint_kept(&visible(&path.to_string_lossy())));
             }
             CheckpointNews::Unused { path, why } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                say_until_key(state, messages::checkpoint_ignored(&visible(&name), &visible(&why)));
+                show_until_key(state, messages::checkpoint_ignored(&visible(&name), &visible(&why)));
             }
             CheckpointNews::Written { .. }
             | CheckpointNews::Finished { .. }
             | CheckpointNews::Absent { .. }
             | CheckpointNews::Ignored { .. } => {}
         },
-        Event::Refused { conflicts, .. } => refused(state, conflicts),
+        Event::Refused { conflicts, .. } => report_conflicts(state, conflicts),
         Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
-            say(state, messages::WRITE_POSTPONED);
+            show_notice(state, messages::WRITE_POSTPONED);
         }
         Event::Done { report, warnings, unchanged, .. } => {
-            let time = state.work.rendering_for(state.now);
+            let time = state.work.rendering_time(state.now);
             done(state, report, warnings, unchanged);
             return notice(state, time);
         }
         Event::Failed { failure, .. } => {
-            let time = state.work.rendering_for(state.now);
+            let time = state.work.rendering_time(state.now);
             failed(state, failure);
             return notice(state, time);
         }
@@ -225,12 +225,12 @@ fn asset(state: &mut State, progress: AssetProgress) {
 }
 
 /// Reports the files written with a key.
-fn wrote(state: &mut State, paths: &[PathBuf]) {
+fn report_written(state: &mut State, paths: &[PathBuf]) {
     state.saving.is_write_requested = false;
     let is_open = state.picture.history.is_open();
     let which = if is_open { messages::WROTE_NEWEST } else { "" };
     let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
-    say(state, messages::wrote(&names.join(", ")) + which);
+    show_notice(state, messages::wrote(&names.join(", ")) + which);
 }
 
 /// Records a written file. It is shown next to the image, since a message would cover the keys.
@@ -241,14 +241,14 @@ fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
         close_empty_pane(state);
     }
-    note(state, path, bytes, (generation, is_own));
+    record_file(state, path, bytes, (generation, is_own));
 }
 
 /// Records an image in a file. Its render may still be running; an existing report belongs to the same image.
-fn note(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
+fn record_file(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
     let view = if is_own { state.request.base_view() } else { state.request.view() };
     let made = match &state.work.report {
-        Some(report) => exit_summary::made(report, view),
+        Some(report) => exit_summary::describe_image(report, view),
         None if generation == state.request.generation => exit_summary::view(view),
         None => String::new(),
     };
@@ -267,7 +267,7 @@ fn describe(state: &mut State, generation: u64, report: &Report) {
     for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
         if is_written || written.shows.is_none() {
             let view = if written.shows.is_none() { base } else { report.settings.view };
-            written.made = exit_summary::made(report, view);
+            written.made = exit_summary::describe_image(report, view);
         }
     }
 }
@@ -280,16 +280,16 @@ pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &Ou
     (written.lost, state.dirty) = (*lost, true);
     if let Some(lost) = lost {
         let name = visible(&path.to_string_lossy()).into_owned();
-        say_until_key(state, messages::output_changed(&name, lost.words()));
+        show_until_key(state, messages::output_changed(&name, lost.words()));
     }
     Vec::new()
 }
 
 /// Shows new conflicts immediately. A pane that the user closed stays closed unless they are new.
-fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
+fn report_conflicts(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
     state.saving.unwritten = Some(messages::NOT_WRITTEN.to_owned());
-    say(state, messages::NOT_WRITTEN);
+    show_notice(state, messages::NOT_WRITTEN);
     let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
     let generation = state.request.generation;
     state.saving.write_failed = Some(WriteFailure { why, generation, is_refused: true });
@@ -366,7 +366,7 @@ fn count(state: &mut State, unchanged: bool) {
 /// keeps its curve.
 fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
-    let origin = state.request.origin(false).of_light();
+    let origin = state.request.origin(false).without_exposure();
     match render.status {
         Status::Done => {
             if let Some(error) = report.image.error {
@@ -377,7 +377,7 @@ fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = state.work.last_curve.clone();
         }
-        Status::Reused => state.work.find_curve(&origin),
+        Status::Reused => state.work.restore_curve(&origin),
         Status::Running | Status::Skipped => {}
     }
     state.work.last_curve = state.work.curve.clone();
@@ -437,7 +437,7 @@ fn broken(state: &mut State, problems: Problems) {
 }
 
 /// Shows errors that were held back, because the files are now complete.
-pub(super) fn settled(state: &mut State) {
+pub(super) fn show_delayed_errors(state: &mut State) {
     state.saving.is_settled = true;
     if let Some(diagnostics) = state.overlays.unconfirmed.take() {
         broken(state, Problems { diagnostics, work: None });

@@ -7,7 +7,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::Span;
 use ratatui::widgets::{Axis, Chart, Dataset, GraphType, Widget};
 
-use super::text::{Tone, put, row, seconds, share, wrapped};
+use super::text::{Tone, put, row, seconds, two_digit_percent, wrapped};
 use crate::color::ColorDepth;
 use crate::messages;
 use crate::preview_kind::PreviewKind;
@@ -63,12 +63,12 @@ const UNBROKEN: &str = "\u{a0}";
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let whole = |amount: String| amount.replace(' ', UNBROKEN);
-    let (from, first) = (whole(share(*from)), whole(seconds(*first)));
-    let (to, last) = (whole(share(*to)), whole(seconds(*last)));
+    let (from, first) = (whole(two_digit_percent(*from)), whole(seconds(*first)));
+    let (to, last) = (whole(two_digit_percent(*to)), whole(seconds(*last)));
     let fell = format!("{from} after {first}, {to} after {last}");
     let line = match target(state) {
         Some(target) => {
-            let share = whole(share(f64::from((target * 1e6).round() as f32) / 1e6));
+            let share = whole(two_digit_percent(f64::from((target * 1e6).round() as f32) / 1e6));
             format!("; {}", messages::noise_target(&share))
         }
         None => String::new(),
@@ -106,7 +106,7 @@ fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
         .style(Style::new())
         .legend_position(None)
         .x_axis(axis(x, x.map(|x| seconds(ten(x)))))
-        .y_axis(axis(bounds, y.map(|y| share(ten(y)))))
+        .y_axis(axis(bounds, y.map(|y| two_digit_percent(ten(y)))))
         .render(area, buffer);
 }
 

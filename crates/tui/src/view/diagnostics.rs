@@ -70,7 +70,7 @@ fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer
         let lines = format!(" lines {}-{} of {all} ", first + 1, first + page);
         room.width -= put_right(buffer, area, &lines, tone, state.display.depth);
     }
-    let room = super::text::rest(room, 1);
+    let room = super::text::right_part(room, 1);
     put(buffer, room, &[(" ", tone), (&words, tone), (" ", tone)], state.display.depth);
 }
 
@@ -91,7 +91,7 @@ fn text(state: &State, area: Rect) -> Vec<StyledLine> {
     let Some(problems) = &state.overlays.problems else { return reported(&state.reported(), width) };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
-        text.extend(toned(&format!("error: {}", visible(work)), width, Tone::Error));
+        text.extend(styled_lines(&format!("error: {}", visible(work)), width, Tone::Error));
     }
     text.extend(reported(&problems.diagnostics, width));
     text
@@ -141,7 +141,7 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
     // The report ends with an empty line and a count, which the title shows already.
     lines.truncate(lines.len().saturating_sub(2));
     let mut lines: Vec<StyledLine> = lines.into_iter().map(line).collect();
-    let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
+    let places: Vec<String> = fault[1..].iter().filter_map(|one| position_words(one)).collect();
     if !places.is_empty() {
         let shown = places.len().min(MAX_PLACES - 1);
         let more = match places.len() - shown {
@@ -150,19 +150,19 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<StyledLine> {
         };
         let number = counted(places.len(), "place");
         let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
-        lines.extend(toned(&text, width, Tone::Plain));
+        lines.extend(styled_lines(&text, width, Tone::Plain));
     }
     lines.push(StyledLine::new());
     lines
 }
 
 /// `line:column`.
-fn place(one: &Diagnostic) -> Option<String> {
+fn position_words(one: &Diagnostic) -> Option<String> {
     let place = one.place.as_ref()?;
     let (line, column) = report::line_and_column(&place.source, place.span.start);
     Some(format!("{line}:{column}"))
 }
 
-fn toned(text: &str, width: usize, tone: Tone) -> Vec<StyledLine> {
+fn styled_lines(text: &str, width: usize, tone: Tone) -> Vec<StyledLine> {
     wrapped(text, width).into_iter().map(|line| vec![(line, tone)]).collect()
 }

@@ -7,11 +7,11 @@ use ratatui::layout::Rect;
 
 use super::layout::{BLOCK, Layout};
 use super::message;
-use super::stages::at_work;
-use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
+use super::stages::running_stage;
+use super::text::{Tone, columns, counted, number, percent, put, put_right, right_part, running, seconds};
 use crate::action::Action;
 use crate::choice::Choice;
-use crate::history::ago;
+use crate::history::age_in_words;
 use crate::keymap;
 use crate::messages;
 use crate::pipeline::protocol::RenderProgress;
@@ -29,7 +29,7 @@ const MIN_NAME: u16 = 6;
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.header;
     let used = block(state, area, buffer);
-    let mut room = rest(area, used + 1);
+    let mut room = right_part(area, used + 1);
     // Without another line, a message takes the whole header.
     if layout.keys.is_empty() && message::replaces_line(state, layout) {
         return;
@@ -39,7 +39,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
             keymap::of(Action::ShowImageOnly).map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
-    let figures = figures(state);
+    let figures = progress_or_result(state);
     // Keep some room for the name if the shortest figures allow it.
     let fitting = [MIN_NAME + 1, 0]
         .into_iter()
@@ -146,7 +146,7 @@ fn close_up(state: &State) -> String {
 }
 
 /// Progress or result, from long to short.
-fn figures(state: &State) -> Vec<String> {
+fn progress_or_result(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.place() {
         let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
@@ -159,7 +159,7 @@ fn figures(state: &State) -> Vec<String> {
                 (place.to_owned(), messages::unnumbered_render(place))
             }
         };
-        let age = ago(state.now.saturating_duration_since(time));
+        let age = age_in_words(state.now.saturating_duration_since(time));
         let mut figures = vec![format!("{words}, {age}"), place.clone()];
         // The newest render continues in the background.
         if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
@@ -184,7 +184,7 @@ fn figures(state: &State) -> Vec<String> {
             vec![format!("{done}{}", eta(state, progress)), done]
         }
         (Activity::Running { .. }, _, None) => {
-            at_work(state).map(|name| format!("{name}…")).into_iter().collect()
+            running_stage(state).map(|name| format!("{name}…")).into_iter().collect()
         }
         (Activity::Done, _, _) if state.work.unchanged => {
             vec![format!("unchanged · {}", messages::render(state.work.renders)), "unchanged".to_owned()]

@@ -49,7 +49,12 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
         let line = row(inner, index);
         let place = Rect { x: line.x + 1, width: labels.min(line.width), ..line };
         put(buffer, place, &[(label, Tone::Strong)], state.display.depth);
-        put(buffer, super::text::rest(line, labels + BESIDE), &[(help, Tone::Plain)], state.display.depth);
+        put(
+            buffer,
+            super::text::right_part(line, labels + BESIDE),
+            &[(help, Tone::Plain)],
+            state.display.depth,
+        );
     }
 }
 

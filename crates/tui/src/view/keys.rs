@@ -6,7 +6,7 @@ use ratatui::layout::Rect;
 use super::header::activity;
 use super::layout::Layout;
 use super::message;
-use super::text::{Tone, columns, put, rest};
+use super::text::{Tone, columns, put, right_part};
 use crate::action::Action;
 use crate::choice::Choice;
 use crate::keymap::{self, Binding, KEYMAP, OVERLAY, OverlayAction};
@@ -34,10 +34,10 @@ impl KeyHint {
     }
 
     fn width(&self, is_long: bool) -> u16 {
-        columns(self.key) + 1 + columns(self.said(is_long)) + GAP
+        columns(self.key) + 1 + columns(self.label(is_long)) + GAP
     }
 
-    fn said(&self, is_long: bool) -> &str {
+    fn label(&self, is_long: bool) -> &str {
         if is_long { &self.words } else { &self.short }
     }
 }
@@ -63,11 +63,11 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let is_long = width(&toggles, true) + OF_USE <= room;
     let mut left = Rect { width: room, ..area };
     for hint in fitting(current_hints(state), toggles, room, is_long) {
-        left = rest(left, show(&hint, left, is_long, state, buffer));
+        left = right_part(left, show(&hint, left, is_long, state, buffer));
     }
-    let mut right = rest(area, room);
+    let mut right = right_part(area, room);
     for hint in ways {
-        right = rest(right, show(hint, right, true, state, buffer));
+        right = right_part(right, show(hint, right, true, state, buffer));
     }
 }
 
@@ -94,7 +94,7 @@ fn fitting(
 }
 
 fn show(hint: &KeyHint, area: Rect, is_long: bool, state: &State, buffer: &mut Buffer) -> u16 {
-    let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.said(is_long), hint.tone)];
+    let pieces = [(hint.key, Tone::Strong), (" ", Tone::Plain), (hint.label(is_long), hint.tone)];
     put(buffer, area, &pieces, state.display.depth);
     hint.width(is_long)
 }

@@ -80,7 +80,7 @@ impl Layout {
         (layout.preview, layout.panel) = match shape {
             None => (Rect::ZERO, rest),
             Some(_) if is_alone => (rest, Rect::ZERO),
-            Some(shape) => divided(rest, shape),
+            Some(shape) => divide(rest, shape),
         };
         let holds = |(width, height)| layout.panel.width >= width && layout.panel.height >= height;
         let has_room = TEXT_SIZES.into_iter().any(holds);
@@ -91,25 +91,25 @@ impl Layout {
 
 /// Divides the room between image and panel so that the image is largest, or leaves out the panel if it takes
 /// too much.
-fn divided(rest: Rect, shape: f32) -> (Rect, Rect) {
+fn divide(rest: Rect, shape: f32) -> (Rect, Rect) {
     let cells = |area| {
         let (width, height) = fit(area, shape);
         u32::from(width) * u32::from(height)
     };
-    let panels = [below(rest, shape), beside(rest, shape)].into_iter().flatten();
+    let panels = [stacked(rest, shape), side_by_side(rest, shape)].into_iter().flatten();
     let best = panels.max_by_key(|(preview, _)| cells(*preview));
     let is_kept = |(preview, _): &(Rect, Rect)| cells(*preview) as f32 >= KEPT * cells(rest) as f32;
     best.filter(is_kept).unwrap_or((rest, Rect::ZERO))
 }
 
-fn beside(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+fn side_by_side(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let room = Rect { width: rest.width.checked_sub(SIDE_WIDTH + 1)?, ..rest };
     let (width, _) = fit(room, shape);
     let panel = Rect { x: rest.x + width + 1, width: rest.width - width - 1, ..rest };
     (rest.height >= SIDE_HEIGHT).then_some((Rect { width, ..rest }, panel))
 }
 
-fn below(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
+fn stacked(rest: Rect, shape: f32) -> Option<(Rect, Rect)> {
     let columns = usize::from(rest.width / ENTRY_WIDTH);
     // The stages, and one line of results.
     let rows = u16::try_from(Stage::ALL.len().div_ceil(columns.max(1)) + 1).unwrap_or(u16::MAX);

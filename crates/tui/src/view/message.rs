@@ -8,7 +8,7 @@ use ratatui::widgets::{Clear, Widget};
 
 use super::layout::Layout;
 use super::status_line;
-use super::text::{Tone, columns, put, rest, row, wrapped};
+use super::text::{Tone, columns, put, right_part, row, wrapped};
 use crate::scene::sanitize::visible;
 use crate::state::State;
 
@@ -27,7 +27,7 @@ enum MessagePosition {
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let Some((words, tone)) = words(state, layout) else { return };
-    let room = match spot(state, layout, &words) {
+    let room = match message_position(state, layout, &words) {
         MessagePosition::Line(line) => {
             Clear.render(line.intersection(buffer.area), buffer);
             put(buffer, line, &[(&words, tone)], state.display.depth);
@@ -54,20 +54,21 @@ pub(super) fn replaces_line(state: &State, layout: &Layout) -> bool {
 
 /// The part of the status line that a message leaves.
 pub(super) fn status_line_rest(state: &State, layout: &Layout) -> Rect {
-    let spot = words(state, layout).map(|(words, _)| spot(state, layout, &words));
+    let spot = words(state, layout).map(|(words, _)| message_position(state, layout, &words));
     let used = match spot {
         Some(MessagePosition::Line(line)) if line.y == layout.under.y => line.width + GAP,
         Some(MessagePosition::Over(room)) if room.bottom() > layout.under.y => layout.under.width,
         Some(MessagePosition::Line(_) | MessagePosition::Over(_)) | None => 0,
     };
-    rest(layout.under, used)
+    right_part(layout.under, used)
 }
 
 /// Whether the message covers the image.
 pub(super) fn is_over_picture(state: &State) -> bool {
     let layout = Layout::of(state);
-    words(state, &layout)
-        .is_some_and(|(words, _)| matches!(spot(state, &layout, &words), MessagePosition::Over(_)))
+    words(state, &layout).is_some_and(|(words, _)| {
+        matches!(message_position(state, &layout, &words), MessagePosition::Over(_))
+    })
 }
 
 /// Whether the panel has room for the inspected values.
@@ -83,8 +84,8 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     let message = state.overlays.message.as_ref().filter(|message| !message.words.is_empty())?;
     let words = visible(&message.words).into_owned();
     // The list of views replaces a long message, and its keys replace a short message without its own line.
-    let has_place =
-        !layout.under.is_empty() && matches!(spot(state, layout, &words), MessagePosition::Line(_));
+    let has_place = !layout.under.is_empty()
+        && matches!(message_position(state, layout, &words), MessagePosition::Line(_));
     if state.overlays.views.is_some() && !has_place {
         return None;
     }
@@ -92,12 +93,12 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
     Some((words, tone))
 }
 
-fn spot(state: &State, layout: &Layout, words: &str) -> MessagePosition {
+fn message_position(state: &State, layout: &Layout, words: &str) -> MessagePosition {
     let width = columns(words);
     let under = layout.under;
     if under.is_empty() {
         // Keep the state block visible.
-        let beside = rest(layout.header, super::layout::BLOCK as u16 + 1);
+        let beside = right_part(layout.header, super::layout::BLOCK as u16 + 1);
         let line = if layout.keys.is_empty() { beside } else { layout.keys };
         let fits = width <= line.width && !line.is_empty();
         return if fits {
@@ -106,7 +107,7 @@ fn spot(state: &State, layout: &Layout, words: &str) -> MessagePosition {
             MessagePosition::Over(with_rows_above(layout, line))
         };
     }
-    let needed = match status_line::least_columns(state, layout) {
+    let needed = match status_line::min_columns(state, layout) {
         0 => 0,
         needed => needed + GAP,
     };

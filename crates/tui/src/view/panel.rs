@@ -9,7 +9,7 @@ use super::message;
 use super::side_panel;
 use super::stages::{self, StyledLine};
 use super::status_line;
-use super::text::{Tone, bytes, columns, gauge, percent, row, share, shortened, wrapped};
+use super::text::{Tone, bytes, columns, gauge, percent, row, shortened, two_digit_percent, wrapped};
 use crate::pipeline::protocol::Stage;
 use crate::preview_kind::PreviewKind;
 use crate::scene::sanitize::visible;
@@ -25,7 +25,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
     if area.is_empty() {
         return ViewExtras::default();
     }
-    let PanelLayout { lines, columns, room } = arranged(state, area);
+    let PanelLayout { lines, columns, room } = panel_layout(state, area);
     let width = room.width / columns;
     let mut drawn = ViewExtras::default();
     for (index, line) in (0..).zip(lines.iter()) {
@@ -43,7 +43,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> ViewExtras
 
 /// The render of the history strip at a cell.
 pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
-    let PanelLayout { lines, columns, room } = arranged(state, area);
+    let PanelLayout { lines, columns, room } = panel_layout(state, area);
     side_panel::picture_at(state, area, rows(&lines, columns, room), place)
 }
 
@@ -54,7 +54,7 @@ struct PanelLayout {
     room: Rect,
 }
 
-fn arranged(state: &State, area: Rect) -> PanelLayout {
+fn panel_layout(state: &State, area: Rect) -> PanelLayout {
     let room = Rect { width: side_panel::columns_of_lines(state, area), ..area };
     let is_one_column = |lines: &[StyledLine]| lines.len() <= usize::from(room.height);
     let mut lines = lines(state, (room.width, room.width), true);
@@ -158,7 +158,7 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
                 format!("{} to {}", samples.min, samples.max)
             },
         ));
-        lines.extend(report.image.error.map(|error| fact("noise", share(error))));
+        lines.extend(report.image.error.map(|error| fact("noise", two_digit_percent(error))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
             let label = if end(state) == Some(RenderEnd::Error) { "target ✓" } else { "target" };
             fact(label, format!("{} % per tile", f64::from((it.error * 1e4).round()) / 100.0))
@@ -169,7 +169,7 @@ fn results(state: &State, width: u16) -> Vec<StyledLine> {
         Some(RenderEnd::Samples) => lines.push(fact("stopped", "at max samples".to_owned())),
         Some(RenderEnd::Error) | None => {}
     }
-    lines.extend(status_line::seen(state).map(|words| vec![(words, Tone::Faint)]));
+    lines.extend(status_line::save_to_screen_time(state).map(|words| vec![(words, Tone::Faint)]));
     lines
 }
 

@@ -71,10 +71,10 @@ impl Ramp {
         if self.is_light {
             let ink = (1.0 - linear.min_element()).max(1e-3);
             let brightness = self.stretched(linear_to_srgb(1.0 - ink));
-            (self.nearest(brightness), coarse(Vec3::ONE - (Vec3::ONE - linear) / ink))
+            (self.nearest(brightness), quantize(Vec3::ONE - (Vec3::ONE - linear) / ink))
         } else {
             let brightest = linear.max_element().max(1e-3);
-            (self.nearest(self.stretched(linear_to_srgb(brightest))), coarse(linear / brightest))
+            (self.nearest(self.stretched(linear_to_srgb(brightest))), quantize(linear / brightest))
         }
     }
 
@@ -102,7 +102,7 @@ fn end(counts: &[usize; 256], mut levels: impl Iterator<Item = usize>, beyond: u
 }
 
 /// Quantizes a color to 5 bits per channel, so that noise causes no redraw.
-fn coarse(linear: Vec3) -> [u8; 3] {
+fn quantize(linear: Vec3) -> [u8; 3] {
     linear.to_array().map(|channel| {
         let level = linear_to_srgb8(channel) >> 3;
         level << 3 | level >> 2

@@ -31,7 +31,7 @@ fn area(state: &State, panel: Rect, lines: u16) -> Rect {
     }
     let used = columns_of_lines(state, panel);
     let area = if used < panel.width {
-        super::text::rest(panel, used + 2)
+        super::text::right_part(panel, used + 2)
     } else {
         // One row stays empty above.
         let used = (lines + u16::from(lines > 0)).min(panel.height);
@@ -70,7 +70,7 @@ fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
         // Side by side.
         let half = if wants_curve(area) { area.width / 3 } else { 0 };
         let gap = if half > 0 { 2 } else { 0 };
-        return (Rect { width: half, ..area }, super::text::rest(area, half + gap));
+        return (Rect { width: half, ..area }, super::text::right_part(area, half + gap));
     }
     if !wants_curve(area) {
         return (Rect::ZERO, area);

@@ -18,12 +18,12 @@ const MIN_WHY: u16 = 12;
 
 /// Symbol, name, time, change and reason. The reason gets its own lines if there is no room next to them.
 pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
-    let mut line = figures(state, stage, room);
+    let mut line = stage_line(state, stage, room);
     let why = why(state, stage);
     if why.is_empty() {
         return vec![line];
     }
-    if columns(&why) <= beside(&line, room) {
+    if columns(&why) <= reason_columns(&line, room) {
         line.push((format!("  {why}"), Tone::Faint));
         return vec![line];
     }
@@ -34,8 +34,8 @@ pub(super) fn lines(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
 
 /// Symbol, name, time, change and as much of the reason as fits in one line.
 pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
-    let mut line = figures(state, stage, room);
-    let (why, room) = (why(state, stage), beside(&line, room));
+    let mut line = stage_line(state, stage, room);
+    let (why, room) = (why(state, stage), reason_columns(&line, room));
     if !why.is_empty() && (room >= MIN_WHY || columns(&why) <= room) {
         line.push((format!("  {}", shortened(&why, room)), Tone::Faint));
     }
@@ -43,7 +43,7 @@ pub(super) fn short(state: &State, stage: Stage, room: u16) -> Vec<StyledLine> {
 }
 
 /// Columns for a reason next to a stage.
-fn beside(line: &StyledLine, room: u16) -> u16 {
+fn reason_columns(line: &StyledLine, room: u16) -> u16 {
     room.saturating_sub(width(line) + 2)
 }
 
@@ -57,7 +57,7 @@ fn why(state: &State, stage: Stage) -> String {
 }
 
 /// Symbol, name, time and, if there is room, change.
-fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
+fn stage_line(state: &State, stage: Stage, room: u16) -> StyledLine {
     let report = state.work.stages.get(stage as usize).and_then(Option::as_ref);
     let has_ended = !state.work.is_running();
     let (sign, tone, time) = match report.map(|report| (report.status, report.seconds)) {
@@ -68,7 +68,7 @@ fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
         Some((Status::Reused, _)) => ("=", Tone::Faint, "reused".to_owned()),
         Some((Status::Skipped, _)) => ("-", Tone::Faint, "skipped".to_owned()),
     };
-    let text_tone = if tone == Tone::Faint { Tone::Faint } else { weight(state, report) };
+    let text_tone = if tone == Tone::Faint { Tone::Faint } else { tone_of_stage(state, report) };
     let line = |gap: u16| {
         let (name, gap) = (stage.name(), usize::from(gap));
         vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
@@ -88,7 +88,7 @@ fn figures(state: &State, stage: Stage, room: u16) -> StyledLine {
 }
 
 /// Bold for stages that an edit caused to run.
-fn weight(state: &State, report: Option<&StageReport>) -> Tone {
+fn tone_of_stage(state: &State, report: Option<&StageReport>) -> Tone {
     let is_again = report.is_some_and(|it| it.status == Status::Done && state.work.renders > 0);
     if is_again && state.saving.edits > 0 { Tone::Strong } else { Tone::Plain }
 }
@@ -128,7 +128,7 @@ fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport)
             let comma = if line.is_empty() { "" } else { ", " };
             line.push((
                 format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),
-                weight(state, Some(report)),
+                tone_of_stage(state, Some(report)),
             ));
             let change = change(state, report);
             if !change.is_empty() {
@@ -145,7 +145,7 @@ fn summary_line_with(state: &State, is_long: bool, counts: impl Fn(&StageReport)
 }
 
 /// The running stage.
-pub(super) fn at_work(state: &State) -> Option<&'static str> {
+pub(super) fn running_stage(state: &State) -> Option<&'static str> {
     let mut stages = state.work.stages.iter().flatten();
     stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }

@@ -6,9 +6,10 @@ use ratatui::layout::Rect;
 
 use super::extras::ViewExtras;
 use super::layout::Layout;
-use super::stages::{self, at_work};
+use super::stages::{self, running_stage};
 use super::text::{
-    Tone, about, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share,
+    Tone, approximate_time, bytes, columns, duration, gauge, percent, put, put_right, right_part, running,
+    two_digit_percent,
 };
 use crate::exit_summary;
 use crate::messages;
@@ -65,7 +66,7 @@ fn content(state: &State) -> StatusContent {
 }
 
 /// Columns of the status line that a message must leave.
-pub(super) fn least_columns(state: &State, layout: &Layout) -> u16 {
+pub(super) fn min_columns(state: &State, layout: &Layout) -> u16 {
     match content(state) {
         StatusContent::Nothing => 0,
         StatusContent::ProgressBar => columns(&bar_words(state, layout).1),
@@ -84,7 +85,7 @@ pub(crate) fn last_good_progress(state: &State) -> Option<&RenderProgress> {
 
 /// Fraction and text for the loading asset or the render.
 fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
-    let time = state.work.rendering_for(state.now).map_or(String::new(), running);
+    let time = state.work.rendering_time(state.now).map_or(String::new(), running);
     match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
             let samples = if progress.is_total_fixed {
@@ -104,7 +105,7 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
 
 /// Draws the progress bar of the loading asset or the render.
 fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
-    let name = at_work(state).unwrap_or_default();
+    let name = running_stage(state).unwrap_or_default();
     let (fraction, words) = bar_words(state, layout);
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
@@ -133,8 +134,10 @@ fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
 
 /// `noise 2.1 % → 1 % in about 14 s` or shorter. Called noise because a noise-free image may still be biased.
 fn noise_words(noise: &NoiseProgress) -> [String; 2] {
-    let now = format!("noise {}", share(noise.now));
-    let next = noise.next.map(|(level, seconds)| format!("{now} → {} in {}", share(level), about(seconds)));
+    let now = format!("noise {}", two_digit_percent(noise.now));
+    let next = noise.next.map(|(level, seconds)| {
+        format!("{now} → {} in {}", two_digit_percent(level), approximate_time(seconds))
+    });
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
@@ -142,7 +145,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut ViewExtras) {
     let of_files = file_pieces(state, layout);
     // Files take precedence if there is not enough room.
-    let room = area.width.saturating_sub(least_columns(state, layout));
+    let room = area.width.saturating_sub(min_columns(state, layout));
     let mut pieces = stages::summary_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, Tone)>| {
@@ -167,7 +170,7 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
         is_room(file);
     }
     let used = drawn.put(state, area, &pieces, buffer);
-    let free = rest(area, used + 2);
+    let free = right_part(area, used + 2);
     let short = if is_mesh(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
     let words = [hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
@@ -178,7 +181,7 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
     let fitting = frame(state).into_iter().find(|words| columns(words) <= free.width);
     let used = put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
-    let seen = seen(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
+    let seen = save_to_screen_time(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
     put_right(buffer, free, &seen, Tone::Faint, state.display.depth);
 }
 
@@ -237,7 +240,7 @@ pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
 }
 
 /// Time from the save to the first changed cell.
-pub(super) fn seen(state: &State) -> Option<String> {
+pub(super) fn save_to_screen_time(state: &State) -> Option<String> {
     state.saving.first_change.map(|time| messages::on_screen(&duration(time)))
 }
 

@@ -2,7 +2,7 @@
 
 use super::preview;
 use super::strip_words::{EntryText, fitting};
-use super::text::{Tone, put, rest, row};
+use super::text::{Tone, put, right_part, row};
 use crate::action::Action;
 use crate::film::Picture;
 use crate::keymap;
@@ -57,18 +57,18 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
 
 fn draw_item(state: &State, StripEntry { index, cells, rows }: &StripEntry, buffer: &mut Buffer) {
     let history = &state.picture.history;
-    let Some(picture) = history.small(*index) else { return };
+    let Some(picture) = history.thumbnail(*index) else { return };
     let place = Rect { height: rows.picture, ..*cells };
     let place = Rect { width: width(state, picture, place), ..place };
     preview::draw_small(state, picture, place, buffer);
-    let is_looked_at = history.looked_at() == Some(*index);
+    let is_looked_at = history.shown_index() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
     // The text is next to the thumbnail, in the same columns with and without a mark.
     let words = EntryText {
         head: format!("{mark}{} ", number(state, *index)),
         changes: history.changes(*index, is_under_way(state, *index)),
     };
-    let beside = rest(*cells, place.width + 1);
+    let beside = right_part(*cells, place.width + 1);
     let lines = fitting(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
     for (y, line) in (0..rows.entry).zip(&lines) {
         put(buffer, row(beside, y), &[(line, tone)], state.display.depth);
@@ -114,7 +114,7 @@ fn items(state: &State, area: Rect) -> Vec<StripEntry> {
         return Vec::new();
     }
     let shown = count.min(room);
-    let looked_at = state.picture.history.looked_at().unwrap_or(count - 1);
+    let looked_at = state.picture.history.shown_index().unwrap_or(count - 1);
     let first = (count - shown).min(looked_at);
     // Use as few rows as possible.
     let high = shown.div_ceil(usize::from(columns)) as u16;

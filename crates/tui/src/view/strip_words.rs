@@ -64,7 +64,7 @@ fn pieces(words: &EntryText, form: ChangeForm, width: usize) -> Vec<ChangePiece>
     };
     let mut pieces = Vec::new();
     for (number, change) in (1..).zip(changes.iter().take(told)) {
-        pieces.extend(of_change(change, form, width.saturating_sub(words.head.width())));
+        pieces.extend(change_pieces(change, form, width.saturating_sub(words.head.width())));
         let end = match () {
             () if number == told => "",
             () if change == messages::STOPPED => ":",
@@ -105,9 +105,9 @@ impl ChangePiece {
 }
 
 /// Pieces of a change: the key and its values, or single words.
-fn of_change(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePiece> {
+fn change_pieces(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePiece> {
     let words = |text: &str| text.split(' ').map(ChangePiece::words).collect::<Vec<_>>();
-    let key = |key: &str| ChangePiece { text: in_form(key, form, beside_head), is_key: true };
+    let key = |key: &str| ChangePiece { text: format_key(key, form, beside_head), is_key: true };
     if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
         let (name, value) = split_key(rest).unwrap_or((rest, ""));
         let value = if value.is_empty() { Vec::new() } else { words(value) };
@@ -127,7 +127,7 @@ fn of_change(change: &str, form: ChangeForm, beside_head: usize) -> Vec<ChangePi
     }
 }
 
-fn in_form(key: &str, form: ChangeForm, beside_head: usize) -> String {
+fn format_key(key: &str, form: ChangeForm, beside_head: usize) -> String {
     match form {
         ChangeForm::Full | ChangeForm::New => key.to_owned(),
         ChangeForm::Short | ChangeForm::First(_) => last_parts(key),

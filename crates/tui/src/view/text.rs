@@ -107,7 +107,7 @@ pub(super) fn row(area: Rect, index: u16) -> Rect {
 }
 
 /// The rest of a row to the right of the used columns.
-pub(super) fn rest(area: Rect, used: u16) -> Rect {
+pub(super) fn right_part(area: Rect, used: u16) -> Rect {
     let used = used.min(area.width);
     Rect { x: area.x + used, width: area.width - used, ..area }
 }
@@ -174,7 +174,7 @@ pub(super) fn bytes(bytes: u64) -> String {
 }
 
 /// An estimated time with at most two digits: `about 9 s`.
-pub(super) fn about(seconds: f64) -> String {
+pub(super) fn approximate_time(seconds: f64) -> String {
     match seconds {
         x if x < 1.0 => "under 1 s".to_owned(),
         x if x < 99.5 => format!("about {x:.0} s"),
@@ -222,7 +222,7 @@ pub(crate) fn percent(fraction: f64) -> u32 {
 }
 
 /// A fraction in percent with two digits: `2.1 %`, `1 %`.
-pub(super) fn share(part: f64) -> String {
+pub(super) fn two_digit_percent(part: f64) -> String {
     let percent = part * 100.0;
     let digits = if percent > 0.0 { (1 - percent.log10().floor() as i32).clamp(0, 6) } else { 0 };
     let text = format!("{percent:.0$}", digits as usize);
@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn shares_have_two_digits() {
-        let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(share);
+        let shares = [0.021, 0.01, 0.000_43, 0.5, 1.7, 0.0, 0.0996].map(two_digit_percent);
         assert_eq!(shares, ["2.1 %", "1 %", "0.043 %", "50 %", "170 %", "0 %", "10 %"]);
     }
 
@@ -301,7 +301,7 @@ mod tests {
 
     #[test]
     fn estimated_times_have_two_digits() {
-        let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(about);
+        let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(approximate_time);
         let words = [
             "under 1 s",
             "about 1 s",

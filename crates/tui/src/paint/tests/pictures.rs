@@ -3,7 +3,7 @@
 use super::*;
 
 /// A window with a preview and a row of text below it.
-fn pictured(columns: u16, rows: u16, pixel: impl Fn(u16, u16) -> [u8; 3]) -> (Buffer, Rect) {
+fn preview_window(columns: u16, rows: u16, pixel: impl Fn(u16, u16) -> [u8; 3]) -> (Buffer, Rect) {
     let picture = Rect::new(1, 0, columns, rows);
     let mut buffer = Buffer::empty(Rect::new(0, 0, columns + 6, rows + 1));
     buffer.set_string(0, rows, "words", ratatui::style::Style::new());
@@ -30,7 +30,7 @@ fn noise(x: u16, y: u16, seed: u32) -> u8 {
 }
 
 /// A smooth image with noise of up to `grain` codes in both directions.
-fn grainy(x: u16, y: u16, seed: u32, grain: i32) -> [u8; 3] {
+fn noisy_pixel(x: u16, y: u16, seed: u32, grain: i32) -> [u8; 3] {
     let smooth = [40 + i32::from(x) * 2, 90 + i32::from(y), 200 - i32::from(x + y)];
     let mut seed = seed;
     smooth.map(|channel| {
@@ -45,7 +45,7 @@ const CELLS: usize = SIDE.0 as usize * SIDE.1 as usize;
 
 fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
     let mut test = TestTerminal::new(buffer.area.width, buffer.area.height, ColorDepth::TrueColor);
-    test.painter.aim(buffer, picture, fidelity);
+    test.painter.set_target(buffer, picture, fidelity);
     test.finish(4096);
     test
 }
@@ -53,7 +53,7 @@ fn showing(buffer: &Buffer, picture: Rect, fidelity: Fidelity) -> TestTerminal {
 #[test]
 fn first_preview_takes_12_bytes_a_cell() {
     for (grain, most) in [(0, 16), (5, 30), (20, 120), (60, 255), (255, 255)] {
-        let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, grain));
+        let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, grain));
         let test = showing(&buffer, picture, Fidelity::First);
         // Clearing the screen and drawing the text.
         let others = 40;
@@ -65,14 +65,14 @@ fn first_preview_takes_12_bytes_a_cell() {
 
 #[test]
 fn noise_below_the_threshold_is_not_sent() {
-    let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 0));
+    let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 0));
     let mut test = showing(&buffer, picture, Fidelity::Still);
     for seed in 2..6 {
-        let (noisy, _) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, seed, 2));
-        test.painter.aim(&noisy, picture, Fidelity::Moving);
+        let (noisy, _) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, seed, 2));
+        test.painter.set_target(&noisy, picture, Fidelity::Moving);
         assert_eq!(test.finish(4096), 0);
     }
-    test.painter.aim(&buffer, picture, Fidelity::Still);
+    test.painter.set_target(&buffer, picture, Fidelity::Still);
     assert_eq!(test.finish(4096), 0, "the cells are still exact");
 }
 
@@ -80,17 +80,17 @@ fn noise_below_the_threshold_is_not_sent() {
 const CHANGED: Rect = Rect { x: 21, y: 6, width: 12, height: 6 };
 
 fn edited(x: u16, y: u16, seed: u32, grain: i32, is_edited: bool) -> [u8; 3] {
-    let [r, g, b] = grainy(x, y, seed, grain);
+    let [r, g, b] = noisy_pixel(x, y, seed, grain);
     if is_edited && CHANGED.contains((x + 1, y / 2).into()) { [b, g / 2, r] } else { [r, g, b] }
 }
 
 #[test]
 fn unedited_cells_are_not_redrawn() {
     let picture_of =
-        |seed, grain, is_edited| pictured(SIDE.0, SIDE.1, |x, y| edited(x, y, seed, grain, is_edited));
+        |seed, grain, is_edited| preview_window(SIDE.0, SIDE.1, |x, y| edited(x, y, seed, grain, is_edited));
     let (first, picture) = picture_of(1, 40, false);
     let mut test = showing(&first, picture, Fidelity::First);
-    test.painter.aim(&picture_of(9, 0, false).0, picture, Fidelity::Still);
+    test.painter.set_target(&picture_of(9, 0, false).0, picture, Fidelity::Still);
     test.finish(4096);
     let before: Vec<CellContent> = on_screen(&test, picture);
 
@@ -103,7 +103,7 @@ fn unedited_cells_are_not_redrawn() {
         (9, 0, Fidelity::Still),
     ] {
         let (buffer, _) = picture_of(seed, grain, true);
-        test.painter.aim(&buffer, picture, fidelity);
+        test.painter.set_target(&buffer, picture, fidelity);
         sent += test.finish(4096);
         for (i, (old, new)) in before.iter().zip(on_screen(&test, picture)).enumerate() {
             let (x, y) = (i as u16 % picture.width + picture.x, i as u16 / picture.width + picture.y);
@@ -115,30 +115,30 @@ fn unedited_cells_are_not_redrawn() {
     assert!(sent <= 100 * cells, "{} bytes a cell", sent / cells);
 
     // Undo the edit while the screen shows it.
-    test.painter.aim(&first, picture, Fidelity::First);
+    test.painter.set_target(&first, picture, Fidelity::First);
     test.finish(4096);
     for (i, (old, new)) in before.iter().zip(on_screen(&test, picture)).enumerate() {
         let (x, y) = (i as u16 % picture.width + picture.x, i as u16 / picture.width + picture.y);
         assert!(CHANGED.contains((x, y).into()) || *old == new, "{x},{y} on the way back");
     }
     let changed_back = on_screen(&test, CHANGED);
-    test.painter.aim(&picture_of(9, 0, true).0, picture, Fidelity::Still);
+    test.painter.set_target(&picture_of(9, 0, true).0, picture, Fidelity::Still);
     test.finish(4096);
     assert_ne!(changed_back, on_screen(&test, CHANGED), "the edit is undone on the screen");
 }
 
 fn on_screen(test: &TestTerminal, area: Rect) -> Vec<CellContent> {
     let places = (area.top()..area.bottom()).flat_map(|y| (area.left()..area.right()).map(move |x| (x, y)));
-    places.map(|(x, y)| shown(test.terminal.screen().cell(y, x).expect("a cell"))).collect()
+    places.map(|(x, y)| cell_content(test.terminal.screen().cell(y, x).expect("a cell"))).collect()
 }
 
 #[test]
 fn frequent_targets_still_reach_the_edges() {
-    let picture_of = |seed| pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, seed, 60));
+    let picture_of = |seed| preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, seed, 60));
     let mut test = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for seed in 0..16 {
         let (buffer, picture) = picture_of(seed);
-        test.painter.aim(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
+        test.painter.set_target(&buffer, picture, if seed == 0 { Fidelity::First } else { Fidelity::Moving });
         // About three rows with this noise.
         test.slice(3 * 40 * usize::from(SIDE.0));
     }
@@ -149,12 +149,12 @@ fn frequent_targets_still_reach_the_edges() {
 
 #[test]
 fn changing_text_does_not_delay_the_preview() {
-    let (mut buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 5));
+    let (mut buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 5));
     let whole = showing(&buffer, picture, Fidelity::First).sent;
     let mut test = TestTerminal::new(SIDE.0 + 6, SIDE.1 + 1, ColorDepth::TrueColor);
     for step in 0..40 {
         buffer.set_string(0, SIDE.1, format!("{step:02}"), ratatui::style::Style::new());
-        test.painter.aim(&buffer, picture, Fidelity::First);
+        test.painter.set_target(&buffer, picture, Fidelity::First);
         test.slice(whole / 20);
     }
     test.finish(4096);
@@ -165,12 +165,12 @@ fn changing_text_does_not_delay_the_preview() {
 
 #[test]
 fn preview_returns_when_text_over_it_goes() {
-    let (buffer, picture) = pictured(SIDE.0, SIDE.1, |x, y| grainy(x, y, 1, 5));
+    let (buffer, picture) = preview_window(SIDE.0, SIDE.1, |x, y| noisy_pixel(x, y, 1, 5));
     let mut test = showing(&buffer, picture, Fidelity::Still);
     let mut covered = buffer.clone();
     covered.set_string(8, 4, "日本 x", ratatui::style::Style::reset());
     for wanted in [&covered, &buffer] {
-        test.painter.aim(wanted, picture, Fidelity::Still);
+        test.painter.set_target(wanted, picture, Fidelity::Still);
         assert!(test.finish(4096) < 400);
         assert!(test.difference(wanted, ColorDepth::TrueColor) <= 1);
     }
