@@ -194,7 +194,7 @@ FAULTS = [
      "pipeline::tests::photons::a_picture_without_photons_comes_before_them_and_one_with_them_takes_its_place"),
     ("unbounded photon map cache", "pipeline/stages/photons.rs", "let has_room = ⟦self.kept_bytes() + pass.memory_bytes() <= MOST_KEPT_BYTES⟧;",
      "true", "pipeline::tests::photons::maps_are_kept_while_there_is_room"),
-    ("no cache for the previous scene", "pipeline/engine/spares.rs", "first_with_room(spares, ⟦MOST_SPARE_BYTES⟧)", "0",
+    ("no cache for the previous scene", "pipeline/engine/eviction.rs", "first_with_room(eviction_candidates, ⟦MOST_SPARE_BYTES⟧)", "0",
      "pipeline::tests::switching::a_scene_that_is_switched_back_to_finds_its_trees_and_pictures"),
     ("unbounded cache of previous scenes", "pipeline/cache.rs", "⟦total <= most_bytes⟧", "true",
      "pipeline::cache::tests::spares_stay_while_there_is_room_and_the_oldest_scene_goes_as_a_whole"),

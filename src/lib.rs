@@ -128,7 +128,7 @@
 //!   its own origin.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
 //! - Only `assets`, `output`, `scene` (the scene file, and whether the files it names exist), `pipeline::watch`, `pipeline::identity`,
-//!   `pipeline::render::keeping` (checkpoints), `cli::bench::cache` and the commands `new`, `import` and `doctor` access files.
+//!   `pipeline::render::checkpointer` (checkpoints), `cli::bench::cache` and the commands `new`, `import` and `doctor` access files.
 //! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which
 //!   restores the terminal when an allocation fails.
 //! - `tui` does not use `world`; `world` knows nothing of pixels or time.

@@ -66,7 +66,7 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     let unused = "[textures.t]\nfile = \"a.ppm\"\nfilter = \"mipmap\"\n[materials.unused]\ndiffuse = { texture = \"t\" }\nnormal_map = \"t\"\n";
     vec![
         FeaturePair {
-            skipped: Some(("photons", "path needs none")),
+            skipped: Some(("photons", glimt::pipeline::protocol::reasons::NOT_USED_BY_PATH)),
             ..pair("photons, with path", path(), path().by("--photons on"))
         },
         FeaturePair {

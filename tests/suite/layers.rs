@@ -107,11 +107,11 @@ fn layers_equal_the_views() {
 fn layers_need_an_exr_output() {
     let dir = dir();
     for (options, words) in [
-        ("--once -o a.png --layers all", "--layers is for EXR files, and a.png is none"),
-        ("--once -o a.exr -o b.hdr --layers all", "b.hdr is none"),
-        ("--once --layers depth", "room.png is none"),
+        ("--once -o a.png --layers all", "a.png"),
+        ("--once -o a.exr -o b.hdr --layers all", "b.hdr"),
+        ("--once --layers depth", "room.png"),
         ("--once -o a.exr --layers depth,colour", "there is no layer \"colour\"; there are all, albedo"),
-        ("--once -o a.exr --layers depth --view normal", "goes with the view beauty"),
+        ("--once -o a.exr --layers depth --view normal", "view beauty"),
         ("--once -o a.part --shard 1/2 --layers depth", "exclude each other"),
         ("-o a.exr --layers depth", "--layers needs --once"),
     ] {

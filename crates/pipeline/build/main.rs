@@ -1,4 +1,4 @@
-//! Sets `GLIMT_BUILD`, the identity of the sources that decide what an image looks like.
+//! Sets `GLIMT_BUILD`, a hash of the sources that affect images.
 
 #![allow(clippy::print_stdout, reason = "a build script speaks to cargo on stdout")]
 
@@ -6,13 +6,13 @@ mod sources;
 
 use std::path::Path;
 
-/// Crates whose sources affect pixels.
+/// Crates whose sources affect images.
 const CRATES: [&str; 6] = ["base", "kernel", "scene", "files", "trace", "pipeline"];
 
 fn main() {
     let crates = Path::new("..");
     let mut roots: Vec<_> = CRATES.iter().map(|name| crates.join(name).join("src")).collect();
-    // Versions of dependencies.
+    // Include the versions of dependencies.
     roots.push(crates.join("../Cargo.lock"));
     for root in &roots {
         println!("cargo::rerun-if-changed={}", root.display());

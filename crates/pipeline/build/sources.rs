@@ -1,10 +1,10 @@
-//! A hash of source files that is the same on every machine.
+//! Hashing of source files, independent of the machine.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Hash of all files in these folders, and of these files, by content and by path below the root. Tests and line endings do not
-/// count; a root that does not exist counts as empty, as in a crate that is built by itself.
+/// Hashes all files in these folders and these files, by content and relative path. Ignores tests and line endings. A
+/// missing root is treated as empty, for a crate that is built alone.
 pub fn identity(roots: &[PathBuf]) -> u64 {
     let mut hash = Hash::default();
     for root in roots {
@@ -17,7 +17,7 @@ pub fn identity(roots: &[PathBuf]) -> u64 {
     hash.0
 }
 
-/// All files below a path that are not tests, in order.
+/// Lists all files below a path except tests, in order.
 fn files(path: &Path) -> Vec<PathBuf> {
     let name = path.file_name().unwrap_or_default();
     if name == "tests" || name == "tests.rs" {
@@ -32,7 +32,7 @@ fn files(path: &Path) -> Vec<PathBuf> {
     paths.iter().flat_map(|path| files(path)).collect()
 }
 
-/// FNV-1a.
+/// 64-bit FNV-1a hash.
 struct Hash(u64);
 
 impl Default for Hash {
@@ -42,7 +42,7 @@ impl Default for Hash {
 }
 
 impl Hash {
-    /// Adds bytes without carriage returns, then an end that they do not contain.
+    /// Adds bytes without carriage returns, and a terminator that text does not contain.
     fn add(&mut self, bytes: &[u8]) {
         for byte in bytes.iter().filter(|byte| **byte != b'\r').chain(&[0xff]) {
             self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);

@@ -1,10 +1,10 @@
-//! The world: what the stages before made, put together.
+//! Assembly of the world from the results of earlier stages.
 
 use std::sync::Arc;
 
 use super::cache::Memo;
 use super::keys;
-use super::stages::accel::Built;
+use super::stages::accel::AccelResult;
 use super::stages::textures::Textures;
 use super::turntable::Turn;
 use crate::assets::OrbiterCamera;
@@ -14,18 +14,18 @@ use crate::scene::description::{Camera, CameraChange, Scene, Viewpoint};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, GlassSolids, World, WorldInputs};
 
-/// A world with the key of all that its pictures depend on.
-pub(super) type Keyed = (Key, Arc<World>);
+/// A world with the key of everything that its images depend on.
+pub(super) type KeyedWorld = (Key, Arc<World>);
 
-/// The camera of a request: the scene's, or what the request makes of it.
+/// The camera of a request: the scene's, or as changed by the request.
 #[derive(Clone, Debug)]
-pub(super) struct Eye {
+pub(super) struct RequestCamera {
     pub(super) camera: Camera,
-    /// The orbiter file, if the camera is in one.
+    /// Content of the orbiter file, if the camera uses one.
     pub(super) orbiter: Option<OrbiterCamera>,
 }
 
-impl Eye {
+impl RequestCamera {
     pub(super) fn new(scene: &Scene, orbiter: Option<OrbiterCamera>, change: &CameraChange) -> Self {
         let own = Self { camera: scene.camera.clone(), orbiter };
         if change.is_any() {
@@ -35,10 +35,10 @@ impl Eye {
         }
     }
 
-    /// The camera of a turntable's picture, if it is one.
+    /// Returns the camera of a turntable frame. Without a turntable, returns it unchanged.
     pub(super) fn turned(self, turn: Option<Turn>) -> Self {
         match turn {
-            // The first one is the camera's own, to the bit.
+            // The first frame has exactly the scene's camera.
             None | Some(Turn { number: 0, .. }) => self,
             Some(turn) => {
                 let view = self.viewpoint();
@@ -52,27 +52,27 @@ impl Eye {
         world::Camera::viewpoint(&self.camera, self.orbiter.as_ref())
     }
 
-    /// Origin of the coordinates in which the camera sees most precisely.
+    /// Returns the coordinate origin that gives the camera the best precision.
     pub(super) fn origin(&self) -> DVec3 {
         world::origin(&self.camera, self.orbiter.as_ref())
     }
 }
 
-/// Put it together, unless the last one is of the same parts.
+/// Assembles the world, or reuses the last one if it has the same key.
 pub(super) fn world(
     scene: &Scene,
     (surfaces, of): (&Key, &Referents<'_>),
-    (built, lights, bodies): (Built, Arc<Lights>, Arc<GlassSolids>),
+    (built, lights, bodies): (AccelResult, Arc<Lights>, Arc<GlassSolids>),
     textures: &Textures,
-    eye: &Eye,
+    eye: &RequestCamera,
     memo: &mut Memo<Arc<World>>,
-) -> Keyed {
+) -> KeyedWorld {
     let key = keys::world(surfaces, &eye.camera, of);
     let built_key = keys::in_trees(&key, scene.render.accel);
     if let Some(world) = memo.get(built_key) {
         return (key, world.clone());
     }
-    let Eye { camera, orbiter } = eye.clone();
+    let RequestCamera { camera, orbiter } = eye.clone();
     let parts = WorldInputs {
         meshes: built.meshes,
         images: textures.images.clone(),

@@ -1,6 +1,6 @@
-//! The identity of this build.
+//! Identity of this build.
 
-/// Version of glimt, and a hash of the sources that decide what an image looks like: builds with the same text render the same bits.
+/// Version of glimt and a hash of the sources that affect images. Builds with equal text render the same bits.
 pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), " (build ", env!("GLIMT_BUILD"), ")");
 
 #[cfg(test)]
@@ -14,7 +14,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_build_is_version_and_hash() {
+    fn build_is_version_and_hash() {
         let hash =
             BUILD.strip_prefix(env!("CARGO_PKG_VERSION")).and_then(|rest| rest.strip_prefix(" (build "));
         let hash = hash.and_then(|rest| rest.strip_suffix(')')).expect("a hash");
@@ -22,7 +22,7 @@ mod tests {
     }
 
     #[test]
-    fn every_source_counts_and_nothing_else() {
+    fn identity_covers_sources_but_not_tests() {
         let folder = tempfile::tempdir().expect("a folder");
         let root = folder.path().join("src");
         let write = |name: &str, text: &str| {

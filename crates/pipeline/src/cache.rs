@@ -1,4 +1,4 @@
-//! Values kept from request to request.
+//! Caches of values between requests.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::Hash;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use crate::scene::fingerprint::Key;
 
-/// The last value of a stage that makes one value.
+/// Cache of one value.
 #[derive(Debug)]
 pub(super) struct Memo<T> {
     last: Option<(Key, T)>,
@@ -19,44 +19,44 @@ impl<T> Default for Memo<T> {
 }
 
 impl<T> Memo<T> {
-    /// The last value, if it was made of these inputs.
+    /// Returns the value if it has this key.
     pub(super) fn get(&self, key: Key) -> Option<&T> {
         self.last.as_ref().filter(|(of, _)| *of == key).map(|(_, value)| value)
     }
 
-    /// The last value, whatever it was made of.
+    /// Returns the value regardless of its key.
     pub(super) fn latest(&self) -> Option<&T> {
         self.last.as_ref().map(|(_, value)| value)
     }
 
-    /// Remember the value and what it was made of, in place of the last one.
+    /// Replaces the value.
     pub(super) fn set(&mut self, key: Key, value: T) {
         self.last = Some((key, value));
     }
 }
 
-/// Values by name, each valid for one key: loaded files and what is built from them. What no request needs any more stays while there
-/// is room, so that a scene that is switched back to finds it.
+/// Cache of named values, each valid for one key: loaded files and values built from them. Unused values are kept while
+/// there is room, so that switching back to a scene is fast.
 #[derive(Debug)]
 pub(super) struct Pool<N, T> {
-    entries: HashMap<N, Entry<T>>,
+    entries: HashMap<N, CacheEntry<T>>,
 }
 
 #[derive(Debug)]
-struct Entry<T> {
+struct CacheEntry<T> {
     key: Key,
     value: Arc<T>,
     bytes: usize,
-    /// Asked for since the last sweep.
+    /// Used since the last sweep.
     used: bool,
-    /// Needed by the last request that succeeded.
+    /// Used by the last successful request.
     proven: bool,
-    /// The number of the last request that asked for it.
+    /// Number of the last request that used it.
     request: u64,
 }
 
-/// Something that no request needs any more: the number of the last one that did, and its bytes.
-pub(super) type Spare = (u64, usize);
+/// An unused value: the number of the last request that used it, and its bytes.
+pub(super) type EvictionCandidate = (u64, usize);
 
 impl<N, T> Default for Pool<N, T> {
     fn default() -> Self {
@@ -65,25 +65,25 @@ impl<N, T> Default for Pool<N, T> {
 }
 
 impl<N: Hash + Eq, T> Pool<N, T> {
-    /// The value of this name, if it was made of these inputs.
+    /// Returns the value of this name if it has this key.
     pub(super) fn get(&mut self, name: &N, key: Key) -> Option<Arc<T>> {
         let entry = self.entries.get_mut(name).filter(|entry| entry.key == key)?;
         entry.used = true;
         Some(entry.value.clone())
     }
 
-    /// The value of this name, whatever it was made of.
+    /// Returns the value of this name regardless of its key.
     pub(super) fn latest(&self, name: &N) -> Option<&Arc<T>> {
         self.entries.get(name).map(|entry| &entry.value)
     }
 
-    /// Keep this value, which takes so many bytes, in place of an older one.
+    /// Replaces the value of this name. `bytes` is its size.
     pub(super) fn insert(&mut self, name: N, key: Key, (value, bytes): (Arc<T>, usize)) {
-        self.entries.insert(name, Entry { key, value, bytes, used: true, proven: false, request: 0 });
+        self.entries.insert(name, CacheEntry { key, value, bytes, used: true, proven: false, request: 0 });
     }
 
-    /// End of the request of this number. After one that failed, what the last good one needed is no spare, so that mending a
-    /// typing error loads nothing again.
+    /// Ends a request. After a failed one, values used by the last successful request remain protected, so that fixing
+    /// a typo loads nothing again.
     pub(super) fn end(&mut self, success: bool, request: u64) {
         for entry in self.entries.values_mut() {
             entry.request = if entry.used { request } else { entry.request };
@@ -92,22 +92,25 @@ impl<N: Hash + Eq, T> Pool<N, T> {
         }
     }
 
-    /// Values that no request needs any more.
-    pub(super) fn spares(&self) -> impl Iterator<Item = Spare> {
+    /// Returns the values that the last successful request did not use.
+    pub(super) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
         self.entries.values().filter(|entry| !entry.proven).map(|entry| (entry.request, entry.bytes))
     }
 
-    /// Drop the spares that no request from this number on asked for.
+    /// Drops unused values that were last used before this request.
     pub(super) fn drop_before(&mut self, request: u64) {
         self.entries.retain(|_, entry| entry.proven || entry.request >= request);
     }
 }
 
-/// The number of the first request whose spares have room, together with those of all later ones. What a request made goes as a
-/// whole: half of a scene is of little use, and a tree holds those that it is over.
-pub(super) fn first_with_room(spares: impl Iterator<Item = Spare>, most_bytes: usize) -> u64 {
+/// Returns the first request whose unused values, together with those of all later requests, fit into `most_bytes`. The
+/// values of a request are evicted together: half of a scene is of little use, and trees keep their meshes alive.
+pub(super) fn first_with_room(
+    eviction_candidates: impl Iterator<Item = EvictionCandidate>,
+    most_bytes: usize,
+) -> u64 {
     let mut bytes_of = BTreeMap::<u64, usize>::new();
-    for (request, bytes) in spares {
+    for (request, bytes) in eviction_candidates {
         *bytes_of.entry(request).or_default() += bytes;
     }
     let mut total = 0;
@@ -128,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_memo_knows_one_key() {
+    fn memo_has_one_key() {
         let mut memo = Memo::default();
         memo.set(key("a"), 1);
         assert_eq!(memo.get(key("a")), Some(&1));
@@ -138,14 +141,14 @@ mod tests {
 
     const NOTHING: usize = 0;
 
-    /// End of a request; spares may take so many bytes.
+    /// Ends a request and evicts unused values above `most_bytes`.
     fn end(pool: &mut Pool<&str, i32>, success: bool, request: u64, most_bytes: usize) {
         pool.end(success, request);
-        pool.drop_before(first_with_room(pool.spares(), most_bytes));
+        pool.drop_before(first_with_room(pool.eviction_candidates(), most_bytes));
     }
 
     #[test]
-    fn what_a_good_request_did_not_use_is_dropped_where_there_is_no_room() {
+    fn unused_values_are_evicted_without_room() {
         let mut pool = Pool::default();
         pool.insert("x", key("1"), (Arc::new(1), 10));
         pool.insert("y", key("1"), (Arc::new(2), 10));
@@ -158,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_request_keeps_what_the_last_good_one_used_and_bounds_the_rest() {
+    fn failed_request_protects_the_last_good_values() {
         let mut pool = Pool::default();
         pool.insert("good", key("1"), (Arc::new(1), 10));
         end(&mut pool, true, 1, NOTHING);
@@ -170,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn spares_stay_while_there_is_room_and_the_oldest_scene_goes_as_a_whole() {
+    fn oldest_scene_is_evicted_as_a_whole() {
         let mut pool = Pool::default();
         for (request, names) in [(1, ["a", "b"]), (2, ["c", "d"]), (3, ["e", "f"])] {
             for name in names {
@@ -178,14 +181,14 @@ mod tests {
             }
             end(&mut pool, true, request, 30);
         }
-        let mut there = |name| pool.get(&name, key("1")).is_some();
-        assert!(!there("a") && !there("b"), "20 bytes of 30 are taken by a newer one");
-        assert!(there("c") && there("d") && there("e"));
-        // The second request makes a value the newest one; the value that it replaces is then the oldest.
+        let mut is_kept = |name| pool.get(&name, key("1")).is_some();
+        assert!(!is_kept("a") && !is_kept("b"), "newer values take 20 of 30 bytes");
+        assert!(is_kept("c") && is_kept("d") && is_kept("e"));
+        // Use the second request's values again, so that the third request's unused value becomes the oldest.
         end(&mut pool, true, 4, 30);
         pool.insert("g", key("1"), (Arc::new(1), 30));
         end(&mut pool, true, 5, 30);
-        let mut there = |name| pool.get(&name, key("1")).is_some();
-        assert!(there("c") && there("d") && there("e") && there("g") && !there("f"));
+        let mut is_kept = |name| pool.get(&name, key("1")).is_some();
+        assert!(is_kept("c") && is_kept("d") && is_kept("e") && is_kept("g") && !is_kept("f"));
     }
 }

@@ -1,11 +1,11 @@
-//! Reading and validating everything that a scene names, without rendering.
+//! Validation of a scene and all files it references, without rendering.
 
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc;
 
-use super::engine::{Engine, Means};
-use super::memory::Foretold;
+use super::engine::{Engine, EngineConfig};
+use super::memory::MemoryEstimate;
 use super::plan::plan;
 use super::protocol::{Failure, PreviewSlot};
 use super::settings::Overrides;
@@ -19,22 +19,22 @@ use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::world::file_emits;
 
-/// What a scene that is right consists of.
+/// Contents of a valid scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked {
-    /// Shapes of any kind; a mesh instance counts as one.
+    /// Shapes of all kinds. A mesh instance counts as one.
     pub objects: u64,
-    /// Triangles over all mesh instances and single triangles.
+    /// Triangles of all mesh instances, and single triangles.
     pub triangles: u64,
-    /// Image files read, each reading of its numbers counted.
+    /// Image files, counted once per encoding.
     pub textures: u64,
-    /// Lights without extent, an environment, and objects that emit; those that are black do not count.
+    /// Point and directional lights, environments and emissive objects that are not black.
     pub lights: u64,
-    /// What is probably not meant.
+    /// Likely mistakes.
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Checks a scene with all files that it names, used or not.
+/// Checks a scene and all files it references, used or not.
 ///
 /// # Errors
 /// All errors and warnings of the scene and its files.
@@ -42,16 +42,16 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
     Checker::default().check(path, sets, &CancelToken::new())
 }
 
-/// Checks scenes, one after the other. Files that have not changed since are not read again.
+/// Checks scenes repeatedly. Unchanged files are not read again.
 pub struct Checker(Engine);
 
 impl Default for Checker {
     fn default() -> Self {
-        Self(Engine::new(Means::default(), Arc::default()))
+        Self(Engine::new(EngineConfig::default(), Arc::default()))
     }
 }
 
-/// Bytes of memory that a render is estimated to need, on the safe side. Reads all files of the scene.
+/// Returns a conservative estimate of the bytes of memory that a render needs. Reads all files of the scene.
 ///
 /// # Errors
 /// All errors of the scene and its files.
@@ -60,7 +60,7 @@ pub fn memory_needed(path: &Path, overrides: &Overrides) -> Result<u64, Failure>
     let token = CancelToken::new();
     let (parsed, meshes, textures, _) = engine.read_all(path, &overrides.sets, &silent_sink(), &token)?;
     let plan = plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
-    Ok(Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
+    Ok(MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
 }
 
 fn silent_sink() -> Sink {
@@ -69,10 +69,10 @@ fn silent_sink() -> Sink {
 }
 
 impl Checker {
-    /// Checks a scene with all files that it names, used or not.
+    /// Checks a scene and all files it references, used or not.
     ///
     /// # Errors
-    /// All errors and warnings of the scene and its files; a failure of the work if the token is cancelled.
+    /// All errors and warnings of the scene and its files, or [`Failure::Work`] if the token is cancelled.
     pub fn check(&mut self, path: &Path, sets: &[String], token: &CancelToken) -> Result<Checked, Failure> {
         let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &silent_sink(), token)?;
         Ok(checked(&parsed, &meshes, &textures, warnings))
@@ -93,11 +93,11 @@ fn checked(parsed: &Parsed, meshes: &Meshes, textures: &Textures, mut warnings: 
     let lights = scene.lights.iter().filter(|light| light.sends()).count();
     let environment = scene.environment.iter().filter(|environment| environment.sends()).count();
     let count = lights + environment + scene.objects.iter().filter(emits).count();
-    // Whether meshes have lights of their own is known only now.
+    // Lights of mesh files are known only now.
     let has_own = scene.objects.iter().any(|object| object.material.is_none());
     if count == 0 && has_own && scene.render.ambient == Vec3::ZERO {
         let (severity, message) = (Severity::Warning, "nothing lights this scene".to_owned());
-        let help = "the mesh's own materials emit nothing; add a [[light]] or an [environment]".to_owned();
+        let help = "the mesh's own materials do not emit; add a [[light]] or an [environment]".to_owned();
         warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
     }
     Checked {

@@ -1,9 +1,9 @@
-//! The identity of a picture: names and values of all that it depends on, the same on every machine and in every folder. Keys of
-//! stages hold paths and time stamps; here files count by what is in them.
+//! Identity of an image: names and values of everything it depends on, equal on every machine and in every folder.
+//! Unlike the keys of stages, which include paths and time stamps, it identifies files by content.
 
 use std::path::{Path, PathBuf};
 
-use super::assembly::Eye;
+use super::assembly::RequestCamera;
 use super::build::BUILD;
 use super::keys;
 use super::plan::Plan;
@@ -15,19 +15,19 @@ use crate::output::part::Trait;
 use crate::scene::description::{CameraChange, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Everything that a picture depends on.
-pub(super) struct Depends<'a> {
+/// Everything that an image depends on.
+pub(super) struct ImageDependencies<'a> {
     pub(super) parsed: &'a Parsed,
     pub(super) plan: &'a Plan,
     pub(super) camera: &'a CameraChange,
-    /// The files that were read, with the scene itself.
+    /// Files that were read, including the scene file.
     pub(super) files: &'a [FileRead],
-    /// Samples of the whole picture if it is divided: its parts must agree about these, and about how it becomes a file.
+    /// Samples of the whole image if it is divided: its parts must agree on them and on the output settings.
     pub(super) divided: Option<u32>,
 }
 
-impl Depends<'_> {
-    /// Names and values.
+impl ImageDependencies<'_> {
+    /// Returns the names and values.
     pub(super) fn traits(&self) -> Vec<Trait> {
         let mut traits = vec![Trait::setting("glimt", BUILD)];
         self.add_settings(&mut traits);
@@ -54,7 +54,7 @@ impl Depends<'_> {
         add("filter", render.filter.name().to_owned());
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
-        // Parts agree about the view itself, checkpoints only about its samples.
+        // Parts must agree on the view, checkpoints only on its samples.
         let sampled = if self.divided.is_some() { view } else { view.sampled() };
         add("view", sampled.name().to_owned());
         add(
@@ -81,10 +81,10 @@ impl Depends<'_> {
         }
     }
 
-    /// Fingerprint of shapes, materials, lights, camera and settings.
+    /// Returns a fingerprint of shapes, materials, lights, camera and settings.
     fn everything(&self) -> Key {
         let scene = self.without_paths();
-        let eye = Eye::new(&scene, self.parsed.orbiter, self.camera);
+        let eye = RequestCamera::new(&scene, self.parsed.orbiter, self.camera);
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let meshes: Vec<Key> =
             scene.mesh_files.iter().map(|file| key(&self.content_of(&file.value), file.part)).collect();
@@ -93,7 +93,7 @@ impl Depends<'_> {
         keys::render(world, &self.plan.settings, self.plan.crop)
     }
 
-    /// The scene with contents in the place of the paths of files.
+    /// Returns the scene with file contents in place of paths.
     fn without_paths(&self) -> Scene {
         let mut scene = Scene::clone(&self.plan.scene);
         for texture in &mut scene.textures {
@@ -105,7 +105,8 @@ impl Depends<'_> {
         scene
     }
 
-    /// Content of a file, in words. A file that was not read counts by its name: the picture does not show it.
+    /// Describes the content of a file. A file that was not read is identified by its name, because it does not affect
+    /// the image.
     fn content_of(&self, path: &Path) -> String {
         match self.files.iter().find(|file| file.path == path) {
             Some(file) => content(file),
@@ -123,7 +124,7 @@ fn key(content: &str, part: Option<u32>) -> Key {
     key.finish()
 }
 
-/// Name of a file as seen from the scene's folder, or alone.
+/// Returns a path relative to the scene's folder if it is inside, or the file name.
 fn short(path: &Path, scene: &Path) -> String {
     let folder = scene.parent().unwrap_or(Path::new(""));
     let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
@@ -131,7 +132,7 @@ fn short(path: &Path, scene: &Path) -> String {
     inside.unwrap_or_else(name).to_string_lossy().into_owned()
 }
 
-/// The content of a file: digits of its hash, or why it has none.
+/// Returns the hash of a file in hexadecimal, or why it has none.
 fn content(file: &FileRead) -> String {
     match file.content {
         Content::Missing => "missing".to_owned(),

@@ -1,4 +1,4 @@
-//! The files that a scene reads or names: the one list that every write is checked against.
+//! The files that a scene reads or references. Every write is checked against this list.
 
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -17,18 +17,18 @@ use crate::scene::{Loaded, is_model};
 #[derive(Clone, Debug)]
 pub(super) struct Input {
     pub(super) path: PathBuf,
-    /// Role of the file in the scene, in words.
+    /// Role of the file in the scene, for messages.
     pub(super) role: String,
-    /// The scene, and where it names the file.
+    /// The scene, and the span that references the file.
     pub(super) place: Option<(Arc<Loaded>, Range<usize>)>,
 }
 
-/// All of them.
+/// All files that must not be written.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Inputs(Vec<Input>);
 
 impl Inputs {
-    /// The scene file and what it names, used or not.
+    /// Collects the scene file and all files it references, used or not.
     pub(super) fn of_scene(parsed: &Parsed) -> Self {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
@@ -49,19 +49,19 @@ impl Inputs {
             add(&texture.file.value, &texture.file.span, format!("the file of texture `{}`", texture.name));
         }
         if let Some(file) = scene.environment.as_ref().and_then(|environment| environment.file.as_ref()) {
-            add(&file.value, &file.span, "the map of the environment".to_owned());
+            add(&file.value, &file.span, "the environment map".to_owned());
         }
         for mesh in &scene.mesh_files {
             add(&mesh.value, &mesh.span, "a mesh file of the scene".to_owned());
         }
         for path in &parsed.named {
-            let role = "a file that the scene names, though not in this call".to_owned();
+            let role = "a file that the scene names without the overrides of this call".to_owned();
             inputs.0.push(Input { path: path.clone(), role, place: None });
         }
         inputs
     }
 
-    /// The material libraries that mesh files name, the pictures that those name, and what glTF files name.
+    /// Adds the material libraries and images of mesh files, and the files that glTF files reference.
     pub(super) fn add_meshes(&mut self, loaded: &Arc<Loaded>, meshes: &Meshes) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
@@ -74,12 +74,12 @@ impl Inputs {
                 add(&companion.path, format!("a {kind} of {name}"));
             }
             for picture in &kept.mesh.pictures {
-                add(picture, format!("a picture that {name} or its materials name"));
+                add(picture, format!("an image that {name} or its materials reference"));
             }
         }
     }
 
-    /// Whatever else was read or tried.
+    /// Adds all other files that were read.
     pub(super) fn add_read(&mut self, files: &[FileRead]) {
         let known: HashSet<PathBuf> = self.0.iter().map(|input| input.path.clone()).collect();
         for file in files.iter().filter(|file| !known.contains(&file.path)) {
@@ -94,7 +94,7 @@ impl Inputs {
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
     }
 
-    /// The files as they are on disk now.
+    /// Returns the files as they currently exist on disk.
     pub(super) fn on_disk(&self) -> OnDisk<'_> {
         let mut on_disk = OnDisk { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
@@ -106,20 +106,20 @@ impl Inputs {
         on_disk
     }
 
-    /// Whether this path leads to one of them now.
+    /// Whether a path currently leads to one of the files.
     pub(super) fn contain(&self, path: &Path) -> bool {
         FileIdentity::of(path).is_some_and(|_| self.on_disk().find(path).is_some())
     }
 }
 
-/// Inputs by everything that tells whether a file is one of them.
+/// Inputs indexed by file identity and by similarity.
 pub(super) struct OnDisk<'a> {
     by_identity: HashMap<FileIdentity, &'a Input>,
     alike: Vec<(Likeness, &'a Input)>,
 }
 
 impl<'a> OnDisk<'a> {
-    /// The input that a path leads to, or has to be taken for.
+    /// Returns the input that a path leads to, or cannot be distinguished from.
     pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
         if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
             return Some(input);
@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_differs_from_an_input_in_case_is_that_input() {
+    fn input_is_recognized_in_another_case() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         for (name, text) in [("t.png", "one"), ("T.PNG", "longer"), ("other.png", "two")] {

@@ -1,5 +1,5 @@
-//! Keys of the values that later stages read of a scene. They leave out places in the file and names, so that comments, the order
-//! of keys and unused tables change nothing.
+//! Keys of the scene data that later stages depend on. They exclude file positions and names, so that comments, the
+//! order of keys and unused tables do not change them.
 
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
@@ -8,17 +8,18 @@ use crate::plan::Plan;
 use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
-/// Textures, meshes and orbiter that descriptions refer to by index.
+/// Returns the textures, meshes and orbiter that descriptions refer to by index.
 pub(crate) fn referents<'a>(scene: &'a Scene, meshes: &'a [Key], orbiter: Option<&'a str>) -> Referents<'a> {
     Referents { textures: &scene.textures, meshes, orbiter }
 }
 
-/// Key of a mesh's tree.
+/// Returns the key of a mesh's tree.
 pub(crate) fn tree(mesh: &Key, accel: Accel) -> Key {
     Fingerprint::new("tree").key(mesh).choice(accel).finish()
 }
 
-/// Key of all geometry in trees, with each object moved by its lift; `lifts` is empty if no object is moved.
+/// Returns the key of all geometry in trees, with each object moved by its lift. `lifts` is empty if no object is
+/// moved.
 pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec3, &[DVec3])) -> Key {
     let mut key = Fingerprint::new("lifted");
     key.key(&from(&shapes(scene, of), origin));
@@ -28,7 +29,7 @@ pub(crate) fn geometry(scene: &Scene, of: &Referents<'_>, (origin, lifts): (DVec
     in_trees(&key.finish(), scene.render.accel)
 }
 
-/// Key of shapes and of which of them emit: lights in the plane of other shapes are moved.
+/// Returns the key of the shapes and which of them emit, which decides the lights that are moved off other surfaces.
 pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("coplanar");
     key.key(&shapes(scene, of));
@@ -44,12 +45,12 @@ pub(crate) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// These things in coordinates that start somewhere.
+/// Returns the key of something in coordinates relative to `origin`.
 pub(crate) fn from(of: &Key, origin: DVec3) -> Key {
     Fingerprint::new("from").key(of).dvec3(origin).finish()
 }
 
-/// Key of geometry in trees of a kind.
+/// Returns the key of geometry in trees of this kind.
 pub(crate) fn in_trees(of: &Key, accel: Accel) -> Key {
     Fingerprint::new("in trees").key(of).choice(accel).finish()
 }
@@ -62,7 +63,7 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Key of the scene's surfaces, and of what those of glass are made of.
+/// Returns the key of the shapes and the glass they are made of.
 pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("glass");
     key.key(&shapes(scene, of));
@@ -76,8 +77,8 @@ pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// What gives light, where it is, and which objects it is. `sky` is the map of the environment, `patterns` are the images that
-/// lamps may have on them.
+/// Returns the key of all lights: emission, position and object. `sky` is the key of the environment map, `patterns` are the
+/// keys of the textures on emitters.
 pub(crate) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
@@ -116,7 +117,7 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
                     key.add(number, of);
                 }
             }
-            // The file's own materials may emit.
+            // Materials of the mesh file may emit.
             None => {
                 key.index(number).add(&object.shape, of).text("own");
             }
@@ -125,12 +126,13 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Everything that a world is made of but the kind of its trees, which all have the same hits: views that show the trees add it.
+/// Returns the key of a world, without the kind of its trees, because all kinds find the same hits. Views that show the
+/// trees add it.
 pub(crate) fn world(surfaces: &Key, camera: &Camera, of: &Referents<'_>) -> Key {
     Fingerprint::new("world").key(surfaces).add(camera, of).finish()
 }
 
-/// Everything that photons depend on: what they meet, in coordinates that start somewhere, how they are sent and how far they go.
+/// Returns the key of photons: surfaces relative to `origin`, emission and maximum depth.
 pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: PhotonSettings) -> Key {
     let PhotonSettings { count, radius, bounces } = photons;
     let mut key = Fingerprint::new("photons");
@@ -138,7 +140,7 @@ pub(crate) fn photons(surfaces: &Key, origin: DVec3, render: &Render, photons: P
     key.u64(render.max_depth.into()).u64(render.seed.into()).finish()
 }
 
-/// Everything that light meets.
+/// Returns the key of all surfaces, lights and textures.
 pub(crate) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> Key {
     let mut key = Fingerprint::new("surfaces");
     key.key(&shapes(scene, of)).key(&described_lights(scene, of));
@@ -155,7 +157,7 @@ pub(crate) fn surfaces(scene: &Scene, of: &Referents<'_>, textures: &[Key]) -> K
     key.finish()
 }
 
-/// Everything that a film's sums depend on, apart from the number of samples.
+/// Returns the key of everything that a film's sums depend on, apart from the number of samples.
 pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) -> Key {
     let mut key = Fingerprint::new("render");
     key.key(&world).add(settings, &Referents::default());
@@ -165,8 +167,8 @@ pub(crate) fn render(world: Key, settings: &RenderSettings, crop: Option<Rect>) 
     key.finish()
 }
 
-/// Key of the image that a film becomes, as it is shown. Films under a budget of time differ in their noise: `film_number` tells
-/// them apart.
+/// Returns the key of the image developed from a film. With a time limit, films have different noise, so `film_number`
+/// is included.
 pub(crate) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
     let Render { samples, error, .. } = plan.settings.render;
     let mut key = Fingerprint::new("image");
@@ -199,26 +201,26 @@ mod tests {
     }
 
     #[test]
-    fn comments_and_unused_tables_change_no_key() {
+    fn comments_and_unused_tables_keep_keys() {
         assert_eq!(keys(BALL), keys(&format!("# hello\n[materials.a]\ntype = \"phong\"\n{BALL}")));
     }
 
     #[test]
-    fn a_colour_changes_the_world_but_no_tree() {
+    fn color_changes_the_world_but_no_tree() {
         let (before, after) = (keys(BALL), keys(&BALL.replace("[1, 0, 0]", "[0, 1, 0]")));
         assert_eq!((before.0, before.1), (after.0, after.1));
         assert_ne!(before.2, after.2);
     }
 
     #[test]
-    fn another_kind_of_tree_changes_the_trees_but_no_picture() {
+    fn tree_kind_changes_trees_but_no_image() {
         let (before, after) = (keys(BALL), keys(&format!("[render]\naccel = \"kdtree\"\n{BALL}")));
         assert_ne!(before.0, after.0);
         assert_eq!((before.1, before.2), (after.1, after.2));
     }
 
     #[test]
-    fn an_emission_changes_the_lights_and_a_place_the_trees() {
+    fn emission_changes_lights_position_trees() {
         let lit = keys(&BALL.replace("diffuse", "emission"));
         assert_eq!(lit.0, keys(BALL).0);
         assert_ne!(lit.1, keys(BALL).1);
@@ -231,25 +233,25 @@ mod tests {
     }
 
     #[test]
-    fn another_number_of_a_light_s_object_changes_the_lights() {
+    fn object_index_of_a_light_changes_the_lights() {
         let ball = "[[sphere]]\ncenter = [3, 0, 0]\nradius = 1\nmaterial = \"dark\"\n";
-        let (dark, lamp) = ("[materials.dark]\n".to_owned(), BALL.replace("diffuse", "emission"));
-        let [behind, before] = [dark.clone() + &lamp + ball, dark + ball + &lamp].map(|text| keys(&text).1);
+        let (dark, light) = ("[materials.dark]\n".to_owned(), BALL.replace("diffuse", "emission"));
+        let [behind, before] = [dark.clone() + &light + ball, dark + ball + &light].map(|text| keys(&text).1);
         assert_ne!(behind, before);
     }
 
     #[test]
-    fn an_environment_changes_the_lights_and_no_tree() {
+    fn environment_changes_lights_but_no_tree() {
         let around = |color: &str| keys(&format!("[environment]\ncolor = {color}\n{BALL}"));
-        let (none, grey, red) = (keys(BALL), around("0.5"), around("\"red\""));
-        assert_eq!((none.0, none.0), (grey.0, red.0));
-        assert!(none.1 != grey.1 && grey.1 != red.1 && none.2 != grey.2 && grey.2 != red.2);
+        let (none, gray, red) = (keys(BALL), around("0.5"), around("\"red\""));
+        assert_eq!((none.0, none.0), (gray.0, red.0));
+        assert!(none.1 != gray.1 && gray.1 != red.1 && none.2 != gray.2 && gray.2 != red.2);
     }
 
     #[test]
-    fn what_only_the_camera_sees_changes_no_light() {
-        let lamp = BALL.replace("diffuse", "emission");
-        let of = |text: &str| keys(&format!("{text}{lamp}")).1;
+    fn camera_settings_do_not_change_lights() {
+        let light = BALL.replace("diffuse", "emission");
+        let of = |text: &str| keys(&format!("{text}{light}")).1;
         for other in
             ["[camera]\nfov = 20\n", "[render]\nbackground = [1, 0, 0]\nambient = [1, 1, 1]\nseed = 4\n"]
         {
@@ -258,13 +260,13 @@ mod tests {
     }
 
     #[test]
-    fn every_setting_of_a_render_is_part_of_its_key() {
+    fn render_key_covers_every_setting() {
         let scene = loaded_of(BALL).scene;
         let plan = crate::plan::plan(&scene, std::path::Path::new("a.toml"), &Default::default());
         let settings = plan.expect("a plan").settings;
         let of = |settings: &RenderSettings| render(Fingerprint::new("w").finish(), settings, None);
         let render_settings = settings.render;
-        // Without `..`: a field that is added does not compile until it has a line below.
+        // Without `..`, so that an added field does not compile until it is tested below.
         let RenderSettings { render: _, dof, view, photons } = settings;
         let Render {
             width,
@@ -319,7 +321,7 @@ mod tests {
         let lit = Render { ambient: ambient + Vec3::ONE, ..render_settings };
         assert_eq!(of(&RenderSettings { render: lit, ..gathering }), of(&gathering));
         assert_eq!(of(&RenderSettings { render: path, ..gathering }), of(&with(path)));
-        // The same samples: more of them, shown in another way, or found by another tree.
+        // The same samples: more of them, displayed differently, or found with another tree.
         for same in [
             Render { samples: samples + 1, ..render_settings },
             Render { exposure: exposure + 1.0, ..render_settings },
@@ -328,12 +330,12 @@ mod tests {
         ] {
             assert_eq!(of(&with(same)), of(&settings), "{same:?}");
         }
-        // The views that show the trees are other pictures by another tree.
+        // Views of the trees depend on the kind of tree.
         for view in [View::Bounds, View::Cost] {
             let by = |accel| RenderSettings { view, ..with(Render { accel, ..render_settings }) };
             assert_ne!(of(&by(Accel::Bvh)), of(&by(Accel::KdTree)), "{view:?}");
         }
-        // What path ignores, and whitted.
+        // Settings that path or whitted ignores.
         for same in
             [Render { shadows: Shadows::Hard, ..path }, Render { ambient: ambient + Vec3::ONE, ..path }]
         {
@@ -344,7 +346,7 @@ mod tests {
         let crop = Rect { x: 0, y: 0, width: 1, height: 1 };
         keys.push(render(Fingerprint::new("w").finish(), &settings, Some(crop)));
         for (i, key) in keys.iter().enumerate() {
-            assert!(!keys[..i].contains(key), "{i} is told apart");
+            assert!(!keys[..i].contains(key), "key {i} is not unique");
         }
     }
 }

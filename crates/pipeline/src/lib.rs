@@ -1,36 +1,36 @@
-//! Stages as functions of their inputs, the caches between them, the worker that owns both, and the watcher of files.
+//! The render pipeline: stages as functions of their inputs, caches, the worker that owns both, and the file watcher.
 //!
-//! [`start`] gives a [`Handle`]: commands in, events out, previews in a slot. `engine` runs one request, stage by stage: `stages` has
-//! one file for each of the eight, `render` the internals of tracing. Each stage compares a [fingerprint](crate::scene::fingerprint)
-//! of its inputs (`keys`) with that of its last value in `cache`, and reports whether it was done, reused or skipped. [`watch`]
-//! reports when a file of a request has another content.
+//! [`start`] returns a [`Handle`], which takes commands and provides events and a slot with the latest preview.
+//! `engine` runs the stages of one request; `stages` has one file per stage, and `render` contains the render loop.
+//! Each stage compares a [fingerprint](crate::scene::fingerprint) of its inputs (`keys`) with the fingerprint of its cached value (`cache`), and reports whether it was done, reused or skipped. [`watch`] reports files whose content has changed.
 
 mod answers;
 mod assembly;
 mod build;
 mod cache;
-mod cautions;
 mod check;
 mod engine;
-mod errands;
 mod identity;
 mod inputs;
 mod keys;
 mod memory;
+pub mod messages;
 mod model;
-mod pace;
 mod plan;
 pub mod protocol;
+mod queries;
 mod render;
 mod report;
 pub mod session;
 pub mod settings;
 mod sink;
 mod stages;
+mod stopwatch;
 mod table;
 mod targets;
 mod trace;
 pub mod turntable;
+mod warnings;
 pub mod watch;
 pub mod words;
 mod worker;

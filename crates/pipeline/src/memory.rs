@@ -1,7 +1,9 @@
-//! Memory that a render will need, foretold before the work: what does not fit is refused with the numbers.
+//! Estimate of the memory that a render needs, before the work: a render that does not fit is rejected with the
+//! numbers.
 //!
-//! Film and picture are known to the byte. Meshes and images count as they were loaded. Trees and photons are estimates, on the safe
-//! side: what builders of trees took at their peak for each triangle, and what maps take for each photon that is emitted.
+//! The sizes of film and image are exact, and those of meshes and textures are known once they are loaded. Trees and
+//! photons are conservative estimates, from the peak memory of builders per triangle and of photon maps per emitted
+//! photon.
 
 use super::plan::Plan;
 use super::render::share::Share;
@@ -14,31 +16,38 @@ use crate::system::memory::{Limit, limit};
 
 /// Bytes of the program itself.
 const PROGRAM: u64 = 24 << 20;
-/// Bytes of a thread that renders: its stack and buffers. Rough glass takes the most.
+/// Bytes of a render thread: its stack and buffers. Rough glass needs the most.
 const THREAD: u64 = 640 << 10;
-/// Bytes of an object of any kind, in its tree.
+/// Bytes of an object of any kind in its tree.
 const OBJECT: u64 = 250;
-/// Bytes that the photons of a pass take while their maps are built, for each that is emitted.
+/// Bytes per emitted photon while the maps of a pass are built.
 const PHOTON: u64 = 220;
-/// Bytes of maps that are kept from pass to pass.
+/// Bytes of the cached maps.
 const KEPT_MAPS: u64 = 128 << 20;
 
-/// Most bytes of the frames of a moving picture, if the call says nothing about memory.
+/// Maximum number of bytes of an animation's frames without `--memory`.
 const MOST_FRAMES: u64 = 4 << 30;
-/// Name of the frames among the parts.
+/// Name of the frames among the items.
 const FRAMES: &str = "the frames";
-/// Name of the own image's film among the parts.
+/// Name of the own image's film among the items.
 const OWN_FILM: &str = "the unfinished film of the scene's own image";
 
-/// A part of the memory, by its name.
-type Item = (&'static str, u64);
+/// Remedy if the film or the image is the largest item.
+const SMALLER_IMAGE: &str = "render a smaller image, or parts of it with --crop";
+/// Remedy if the limit is below 1 MiB.
+const MISSING_UNIT: &str = "sizes without a unit are in bytes; add a unit, for example 8GiB";
+/// Remedy if there is nothing to reduce.
+const ALLOW_MORE: &str = "allow more";
 
-/// Memory of a render, as far as it is known.
+/// Name and bytes of a part of the memory.
+type MemoryItem = (&'static str, u64);
+
+/// Estimated memory of a render.
 #[derive(Clone)]
-pub(super) struct Foretold(Vec<Item>);
+pub(super) struct MemoryEstimate(Vec<MemoryItem>);
 
-impl Foretold {
-    /// Memory of the picture, before any file is read.
+impl MemoryEstimate {
+    /// Estimates the memory of the image, before any file is read.
     pub(super) fn of_picture(plan: &Plan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
@@ -48,11 +57,11 @@ impl Foretold {
         let mut items = vec![
             ("the program", PROGRAM),
             ("the film", film),
-            ("the picture", picture),
+            ("the image", picture),
             ("the threads", threads),
         ];
         if !plan.layers.is_empty() {
-            // One film at a time, and a picture of each.
+            // One film at a time, and the image of each layer.
             items.push(("the layers", film + picture * plan.layers.len() as u64));
         }
         if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
@@ -62,7 +71,7 @@ impl Foretold {
         Self(items)
     }
 
-    /// The same with all that the scene names.
+    /// Estimates the memory of the image and everything that the scene references.
     pub(super) fn of_scene(plan: &Plan, scene: &Scene, meshes: &Meshes, texture_bytes: u64) -> Self {
         let Self(mut items) = Self::of_picture(plan);
         let triangle = match scene.render.accel {
@@ -83,13 +92,13 @@ impl Foretold {
         Self(items)
     }
 
-    /// The same with the film of the scene's own image, which is kept while keys show something else.
+    /// Adds the film of the scene's own image, which is kept while keys show another one.
     pub(super) fn with_own_film(mut self, bytes: u64) -> Self {
         self.0.push((OWN_FILM, bytes));
         self
     }
 
-    /// Bytes of all parts.
+    /// Total in bytes.
     pub(super) fn bytes(&self) -> u64 {
         self.0.iter().fold(0, |sum: u64, (_, bytes)| sum.saturating_add(*bytes))
     }
@@ -98,27 +107,27 @@ impl Foretold {
         self.0.iter().filter(|(name, _)| *name == OWN_FILM).map(|(_, bytes)| bytes).sum()
     }
 
-    /// Refuses what takes more than the call, or else the system, allows. Returns the bytes that are left.
+    /// Rejects a render that needs more memory than the command line or the system allows. Returns the remaining bytes.
     ///
     /// # Errors
-    /// The work would need more, with the numbers and a way out.
+    /// The render would need more, with the numbers and a remedy.
     pub(super) fn check(&self, plan: &Plan) -> Result<u64, Stop> {
         self.check_within(plan, limit)
     }
 
-    /// [`Self::check`] where the system has this limit.
+    /// [`Self::check`] with the system's limit as a parameter.
     fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
         let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MOST_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
             return Err(Stop::work(format!(
-                "the frames of the moving picture would take {} of memory until it is written; render fewer or smaller \
-                 frames, or a file each, as in a_####.png; --memory {} allows it",
+                "the frames of the animation need {} of memory until it is written; render fewer or smaller frames, or \
+                 numbered files such as a_####.png; --memory {} allows it",
                 words(*bytes),
                 allowance(all)
             )));
         }
-        // A size that the call names counts in place of the system's: the estimate is on the safe side.
+        // A limit on the command line replaces the system's, because the estimate is conservative.
         let limit = plan.memory.map(|bytes| Limit { bytes, setting: "--memory".to_owned() }).or_else(limit);
         let Some(Limit { bytes: most, setting }) = limit else { return Ok(u64::MAX) };
         if all <= most {
@@ -128,25 +137,25 @@ impl Foretold {
         largest.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
         let items = largest.iter().filter(|(_, bytes)| *bytes * 100 > all);
         let items: Vec<String> = items.map(|(name, bytes)| format!("{name} {}", words(*bytes))).collect();
-        let way_out = match largest.first() {
+        let remedy = match largest.first() {
             _ if all - self.own_film() <= most => {
-                "go back to the scene's own settings, or let its image be finished first"
+                "return to the scene's own settings, or let its image finish first"
             }
-            Some(("the film" | "the picture", _)) => "render a smaller picture, or parts of it by --crop",
-            Some(("the layers", _)) => "ask for fewer layers or a smaller picture",
-            Some((FRAMES, _)) => "render fewer or smaller frames, or a file each, as in a_####.png",
+            Some(("the film" | "the image", _)) => SMALLER_IMAGE,
+            Some(("the layers", _)) => "request fewer layers or a smaller image",
+            Some((FRAMES, _)) => "render fewer or smaller frames, or numbered files such as a_####.png",
             Some(("meshes" | "trees", _)) => "use --accel bvh or smaller meshes",
             Some(("textures", _)) => "use smaller textures",
-            Some(("photons", _)) => "give [photons] a smaller `count`",
-            Some(_) | None => "allow more",
+            Some(("photons", _)) => "reduce `count` in [photons]",
+            Some(_) | None => ALLOW_MORE,
         };
-        let way_out = match most < 1 << 20 {
-            true => "a size without a unit is in bytes: give one, as in 8GiB",
-            false => way_out,
+        let remedy = match most < 1 << 20 {
+            true => MISSING_UNIT,
+            false => remedy,
         };
         let try_anyway = format!(", raise the limit, or try anyway with --memory {}", allowance(all));
         Err(Stop::work(format!(
-            "the render needs about {} of memory ({}), more than the {} of {setting}; {way_out}{}",
+            "the render needs about {} of memory ({}), more than the {} of {setting}; {remedy}{}",
             words(all),
             items.join(", "),
             words(most),
@@ -155,7 +164,7 @@ impl Foretold {
     }
 }
 
-/// Order in which the samples of a plan are added up. Whether photons are emitted at all is known later.
+/// Returns the order in which samples are summed. Whether photons are emitted at all is only known later.
 fn blocks(plan: &Plan) -> SumOrder {
     let gathers = plan.settings.gathers();
     match plan.shard {
@@ -165,12 +174,12 @@ fn blocks(plan: &Plan) -> SumOrder {
     }
 }
 
-/// A size for `--memory` that is enough for so many bytes.
+/// Formats a `--memory` value of at least this many bytes.
 fn allowance(bytes: u64) -> String {
     format!("{}GiB", bytes.div_ceil(1 << 30))
 }
 
-/// `1.25 GiB`, `300 MiB`; below that `12 KiB`, `1 byte`
+/// Formats a size: `1.25 GiB`, `300 MiB`, `12 KiB`, `1 byte`.
 fn words(bytes: u64) -> String {
     match bytes {
         1 => return "1 byte".to_owned(),
@@ -207,57 +216,58 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_the_numbers() {
+    fn too_large_render_is_rejected_with_numbers() {
         let large = Overrides {
             width: Some(8000),
             height: Some(8000),
             memory: Some(1 << 30),
             ..Overrides::default()
         };
-        let said = match Foretold::of_picture(&planned(&large)).check(&planned(&large)) {
+        let said = match MemoryEstimate::of_picture(&planned(&large)).check(&planned(&large)) {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
         // 64 million pixels of 40 and 15 bytes.
-        assert!(said.contains("needs about 3.30 GiB of memory (the film 2.38 GiB"), "{said}");
-        assert!(said.contains("more than the 1.00 GiB of --memory; render a smaller picture"), "{said}");
+        for fact in [" 3.30 GiB ", " 2.38 GiB", " 1.00 GiB of --memory", SMALLER_IMAGE] {
+            assert!(said.contains(fact), "{fact}: {said}");
+        }
         let said = |memory: u64| {
             let small = Overrides { memory: Some(memory), ..Overrides::default() };
-            match Foretold::of_picture(&planned(&small)).check(&planned(&small)) {
+            match MemoryEstimate::of_picture(&planned(&small)).check(&planned(&small)) {
                 Err(Stop::Failed(Failure::Work(said))) => said,
                 other => panic!("{other:?}"),
             }
         };
-        assert!(said(1).contains("more than the 1 byte of --memory; a size without a unit is in bytes"));
-        assert!(said(8 << 10).contains("more than the 8 KiB of --memory"));
+        assert!(said(1).contains("1 byte of --memory") && said(1).contains(MISSING_UNIT));
+        assert!(said(8 << 10).contains(" 8 KiB of --memory"));
         let said = said(8 << 20);
-        assert!(said.contains("more than the 8 MiB of --memory; allow more"), "{said}");
+        assert!(said.contains(" 8 MiB of --memory") && said.contains(ALLOW_MORE), "{said}");
         let crop = Some(Rect { x: 10, y: 10, width: 500, height: 500 });
         let part = Overrides { crop, memory: Some(1 << 30), ..large };
-        assert!(Foretold::of_picture(&planned(&part)).check(&planned(&part)).is_ok());
+        assert!(MemoryEstimate::of_picture(&planned(&part)).check(&planned(&part)).is_ok());
     }
 
     #[test]
-    fn a_limit_of_the_system_counts_unless_the_call_names_one() {
+    fn system_limit_applies_without_a_memory_option() {
         let limit = || Some(Limit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
         let check = |overrides: &Overrides| {
             let plan = planned(overrides);
-            Foretold::of_picture(&plan).check_within(&plan, limit)
+            MemoryEstimate::of_picture(&plan).check_within(&plan, limit)
         };
         let said = match check(&Overrides::default()) {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
-        assert!(said.contains("needs about 42 MiB of memory"), "{said}");
-        assert!(said.contains("more than the 8 MiB of the control group (x); "), "{said}");
-        assert!(said.ends_with("raise the limit, or try anyway with --memory 1GiB"), "{said}");
+        for fact in [" 42 MiB ", " 8 MiB of the control group (x); ", "--memory 1GiB"] {
+            assert!(said.contains(fact), "{fact}: {said}");
+        }
         assert!(check(&Overrides { memory: Some(1 << 30), ..Overrides::default() }).is_ok());
     }
 
     #[test]
-    fn blocks_that_are_kept_apart_count() {
+    fn separate_blocks_are_counted() {
         let photons = Overrides { photons: Some(true), samples: Some(64), ..Overrides::default() };
-        let film = |overrides: &Overrides| Foretold::of_picture(&planned(overrides)).0[1].1;
+        let film = |overrides: &Overrides| MemoryEstimate::of_picture(&planned(overrides)).0[1].1;
         let pixels = 640 * 480;
         let plain = film(&Overrides::default());
         assert_eq!(film(&photons) - plain, pixels * 24);

@@ -1,4 +1,4 @@
-//! From a scene and what the command line changes of it to the settings that hold.
+//! Resolution of a scene and the overrides into the effective settings of a request.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -17,14 +17,14 @@ use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Everything that a request's later stages go by.
+/// Resolved settings of one request: scene, command line and keys merged.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
-    /// The scene file, or the model.
+    /// Path of the scene file or model.
     pub(super) path: PathBuf,
-    /// Its file name, for parts to carry.
+    /// File name of the scene, which is stored in parts.
     pub(super) name: String,
-    /// The scene; where the overrides ask for it, with another acceleration structure. All other overrides are in the
+    /// The scene, with another acceleration structure if the overrides set one. All other overrides are in the
     /// settings.
     pub(super) scene: Arc<Scene>,
     pub(super) settings: RenderSettings,
@@ -33,47 +33,48 @@ pub(super) struct Plan {
     pub(super) time_seconds: Option<f64>,
     pub(super) tone: ToneMapping,
     pub(super) bit_depth: u8,
-    /// Files of this picture.
+    /// Output files of this image.
     pub(super) outputs: Vec<PathBuf>,
-    /// Files of the moving pictures that it is a frame of.
+    /// Animations that this image is a frame of.
     pub(super) moving: Vec<PathBuf>,
-    /// The picture of a turntable that it is. `None` for a single picture.
+    /// Turntable frame. `None` for a still image.
     pub(super) turn: Option<Turn>,
-    /// Layers beside the picture in EXR files.
+    /// Layers in addition to the image in EXR files.
     pub(super) layers: Vec<Layer>,
-    /// The side from which a model is seen, and its axis that points upwards, where the call names them.
+    /// Side from which a model is seen and its up axis, if the command line sets them.
     pub(super) from: Option<Side>,
     pub(super) up: Option<UpAxis>,
-    /// Files of the other pictures of the turntable, still to come.
-    pub(super) to_come: Vec<PathBuf>,
+    /// Output files of later turntable frames.
+    pub(super) later_outputs: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
-    /// The name of a turntable's pictures that nobody named, with `#` for their numbers. `None` otherwise.
-    pub(super) usual_names: Option<PathBuf>,
+    /// Default file name of turntable frames, with `#` for the number. `None` if the user named the files or there is
+    /// no turntable.
+    pub(super) default_names: Option<PathBuf>,
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
-    /// The part of the picture that is rendered, from 1, and the number of parts.
+    /// Part of the image to render, from 1, and the number of parts.
     pub(super) shard: Option<(u32, u32)>,
     pub(super) checkpoints: Checkpoints,
-    /// Most bytes that the render may need.
+    /// Maximum number of bytes that the render may need.
     pub(super) memory: Option<u64>,
     pub(super) effective: Effective,
 }
 
-/// Source of the picture's file names.
+/// Where the output file names are from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum NamedBy {
     /// `-o`.
-    Call,
+    CommandLine,
     /// `output` in `[render]`.
     Scene,
-    /// Nobody: the scene's name with `.png`.
-    Nobody,
+    /// The scene's name with `.png`.
+    Default,
 }
 
-/// Put scene and overrides together.
+/// Merges a scene and overrides.
 ///
 /// # Errors
-/// A crop outside the picture, or a file that cannot hold it.
+/// A crop outside of the image, or an output file that cannot hold the image.
 pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Result<Plan, Box<Diagnostic>> {
     let mut render = overrides.applied(&scene.render);
     if scene.environment.is_some() {
@@ -92,12 +93,12 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     };
     let threads = threads(overrides);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
-    let is_usual = named_by == NamedBy::Nobody && overrides.turn.is_some();
-    let usual_names = outputs.first().filter(|_| is_usual).cloned();
-    let Outputs { outputs, moving, to_come } = Outputs::of(outputs, overrides.turn);
+    let is_usual = named_by == NamedBy::Default && overrides.turn.is_some();
+    let default_names = outputs.first().filter(|_| is_usual).cloned();
+    let OutputFiles { outputs, moving, later_outputs } = OutputFiles::of(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
-        // A part has no format of pictures.
+        // Parts are not in an image format.
         Some(_) => check_shard(&settings, overrides)?,
         None => {
             let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
@@ -120,13 +121,13 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         effective: Effective::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
         outputs,
         moving,
-        to_come,
+        later_outputs,
         turn: overrides.turn,
         layers: overrides.layers.clone(),
         from: overrides.from,
         up: overrides.up,
         named_by,
-        usual_names,
+        default_names,
         report: report(overrides),
         replaces_foreign: overrides.replaces_foreign,
         shard: overrides.shard,
@@ -136,14 +137,14 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     })
 }
 
-/// Photons that a pass may send: what it stores must have room.
+/// Maximum number of photons per pass, which must be stored.
 pub(super) const MOST_PHOTONS: u64 = 4_000_000;
 
-/// Photons of a pass where the scene leaves their number open: as many as the picture has pixels, within these bounds. Fewer leave more
-/// error than they save time, and more take time in which another pass brings more; the first picture waits for the first pass.
+/// Bounds of the default photon count, which is the number of pixels. Fewer photons increase the error more than they
+/// save time; more take the time of further passes, and delay the first image.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
-/// Returns the photon settings for a picture of a size, in pixels.
+/// Returns the photon settings for an image of this size.
 fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {
@@ -154,7 +155,7 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
-/// The scene with this acceleration structure. A scene may be large: it is copied only if the structure is another one.
+/// Returns the scene with this acceleration structure. Copies it only if necessary, because it may be large.
 fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     let mut scene = Arc::clone(scene);
     if scene.render.accel != accel {
@@ -163,59 +164,60 @@ fn with_accel(scene: &Arc<Scene>, accel: Accel) -> Arc<Scene> {
     scene
 }
 
-/// The command line's files, else the scene's, else the scene's name with `.png` in the working directory.
+/// Returns the output files of the command line, of the scene, or the scene's name with `.png` in the working
+/// directory.
 fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (Vec<PathBuf>, NamedBy) {
     if !overrides.outputs.is_empty() {
-        return (overrides.outputs.clone(), NamedBy::Call);
+        return (overrides.outputs.clone(), NamedBy::CommandLine);
     }
     if let Some(of_scene) = of_scene {
         return match overrides.turn {
             None => (vec![of_scene.clone()], NamedBy::Scene),
-            // The scene names one picture: nobody has named those of a turntable.
-            Some(_) => (vec![turntable::suggested(of_scene)], NamedBy::Nobody),
+            // The scene names only one file, so the turntable uses default names.
+            Some(_) => (vec![turntable::suggested(of_scene)], NamedBy::Default),
         };
     }
     let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
     name.push(".png");
     let name = PathBuf::from(name);
-    (vec![if overrides.turn.is_some() { turntable::suggested(&name) } else { name }], NamedBy::Nobody)
+    (vec![if overrides.turn.is_some() { turntable::suggested(&name) } else { name }], NamedBy::Default)
 }
 
-/// The file of the report: in a turntable one with the picture's number.
+/// Returns the report's file. In a turntable, it has the frame's number.
 fn report(overrides: &Overrides) -> Option<PathBuf> {
     let path = overrides.report.as_ref()?;
     let numbered = overrides.turn.and_then(|turn| turntable::numbered(path, turn));
     Some(numbered.unwrap_or_else(|| path.clone()))
 }
 
-/// Files of a request, by what they hold.
-struct Outputs {
+/// Output files of a request by kind.
+struct OutputFiles {
     outputs: Vec<PathBuf>,
     moving: Vec<PathBuf>,
-    to_come: Vec<PathBuf>,
+    later_outputs: Vec<PathBuf>,
 }
 
-impl Outputs {
+impl OutputFiles {
     fn of(paths: Vec<PathBuf>, turn: Option<Turn>) -> Self {
-        let (mut moving, mut to_come) = (Vec::new(), Vec::new());
-        let Some(turn) = turn else { return Self { outputs: paths, moving, to_come } };
+        let (mut moving, mut later_outputs) = (Vec::new(), Vec::new());
+        let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
         let mut outputs = Vec::new();
         for path in paths {
             if MovingFormat::of(&path).is_some() {
                 moving.push(path);
                 continue;
             }
-            // The other files are named with the first one, so that nothing is found in their way when hours of work are done.
+            // The first frame also lists later files, so that conflicts with them are found before hours of work.
             let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
             let of = |number| turntable::numbered(&path, Turn { number, ..turn });
-            to_come.extend(others.filter_map(of));
+            later_outputs.extend(others.filter_map(of));
             outputs.push(of(turn.number).unwrap_or(path));
         }
-        Self { outputs, moving, to_come }
+        Self { outputs, moving, later_outputs }
     }
 }
 
-/// Whether there is a file for the layers that the call asks for.
+/// Checks that the requested layers can be written.
 fn check_layers(
     outputs: &[PathBuf],
     moving: &[PathBuf],
@@ -231,25 +233,25 @@ fn check_layers(
     };
     let is_exr = |path: &&PathBuf| Format::of(path).is_ok_and(|format| format == Format::Exr);
     if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
-        let message = format!("--layers is for EXR files, and {} is none", other.display());
-        return refused(message, "write them to a file of their own, as in -o layers.exr");
+        let message = format!("`--layers` needs EXR output; {} is not an EXR file", other.display());
+        return refused(message, "write an EXR file, for example -o layers.exr");
     }
     if view != View::Beauty {
-        let message = format!("--layers goes with the view beauty, not with {}", view.name());
-        return refused(message, "leave out --view, or name the view as a layer");
+        let message = format!("`--layers` needs the view beauty, not {}", view.name());
+        return refused(message, "remove --view, or request it as a layer");
     }
     Ok(())
 }
 
-/// Whether a moving picture can be made of such pictures.
+/// Checks that an animation can hold such images.
 fn check_moving(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let Some(format) = MovingFormat::of(path) else { return Ok(()) };
     let message = match format.check_size(size.0, size.1) {
         Err(error) => error.to_string(),
-        Ok(()) if bit_depth != 8 => format!("a moving {format} file has 8 bits a channel"),
+        Ok(()) if bit_depth != 8 => format!("animated {format} files have 8 bits per channel"),
         Ok(()) => return Ok(()),
     };
-    let help = Some("write a file each, as in a_####.png".to_owned());
+    let help = Some("use numbered files, for example a_####.png".to_owned());
     Err(Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place: None, help }))
 }
 
@@ -263,18 +265,18 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
         Some(rect) if !inside(rect) => Err(Box::new(Diagnostic {
             severity: Severity::Error,
             message: format!(
-                "--crop {},{},{},{} does not lie inside the picture of {width}×{height} pixels",
+                "`--crop {},{},{},{}` is not inside the image of {width}×{height} pixels",
                 rect.x, rect.y, rect.width, rect.height
             ),
             path: PathBuf::new(),
             place: None,
-            help: Some("X,Y,W,H are the left and top pixel, the width and the height".to_owned()),
+            help: Some("X,Y,W,H are the left edge, top edge, width and height in pixels".to_owned()),
         })),
         _ => Ok(()),
     }
 }
 
-/// Whether a picture with these settings can be divided, and whether it is known where the part goes.
+/// Checks that an image with these settings can be divided, and that the part has an output file.
 fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
     let refused = |message: &str, help: &str| {
         let (message, help) = (message.to_owned(), Some(help.to_owned()));
@@ -287,32 +289,29 @@ fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), B
         }))
     };
     if overrides.outputs.len() != 1 {
-        return refused(
-            "--shard writes one part, and -o must name its file",
-            "name it, as in -o night.1.part",
-        );
+        return refused("`--shard` needs exactly one output file", "name it, for example -o night.1.part");
     }
     if overrides.time_seconds.is_some() {
         return refused(
-            "--shard and --time exclude each other: machines differ in speed",
-            "give --samples or --error",
+            "`--shard` does not work with `--time`: machines differ in speed",
+            "use --samples or --error",
         );
     }
     if settings.gathers() && settings.render.error > 0.0 {
         let message =
-            "--shard cannot divide photons with a noise threshold: each pass needs the whole picture";
-        return refused(message, "give --error 0 and --samples, or --photons off");
+            "`--shard` does not work with photons and a noise target: each pass needs the whole image";
+        return refused(message, "use --error 0 with --samples, or --photons off");
     }
     if settings.gathers() && settings.view.source() == AovSource::Film(Quantity::Error) {
         return refused(
-            "--shard cannot divide the view `error` of photons",
-            "render it in one, or with --photons off",
+            "`--shard` does not work with photons and the view `error`",
+            "render it without --shard, or use --photons off",
         );
     }
     Ok(())
 }
 
-/// Whether a file of this ending can hold such a picture.
+/// Checks that the file's format can hold such an image.
 fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
     let check = || Format::of(path)?.check_picture(size.0, size.1, BitDepth::try_from(bit_depth)?);
     check().map_err(|error: OutputError| {
@@ -321,7 +320,7 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
     })
 }
 
-/// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
+/// Returns the tone mapping of a view. Exposure and tone curve apply to light; data are shown unchanged.
 fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
     match view.source() {
         AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
@@ -338,12 +337,12 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
         AovSource::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
             ToneMapping::DATA
         }
-        // It is linear, but no exposure makes it more than it is.
+        // The values are linear, but exposure must not exaggerate them.
         AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
     }
 }
 
-/// Threads that this machine runs at once.
+/// Number of render threads: as requested, or one per core.
 pub(super) fn threads(overrides: &Overrides) -> usize {
     overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores)
 }
@@ -365,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn the_command_line_wins_over_the_scene_and_the_scene_over_defaults() {
+    fn command_line_overrides_scene_and_defaults() {
         let text = "[render]\nwidth = 32\nheight = 24\nsamples = 4\n";
         let size = |plan: &Plan| {
             let render = &plan.settings.render;
@@ -386,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn photons_are_as_many_as_pixels_within_bounds_unless_the_scene_says_how_many() {
+    fn default_photon_count_is_the_pixel_count() {
         let count = |table: &str, width, height, crop| {
             let overrides =
                 Overrides { width: Some(width), height: Some(height), crop, ..Default::default() };
@@ -403,12 +402,12 @@ mod tests {
             ("count = 9_000_000", 320, 240, MOST_PHOTONS as u32),
         ] {
             assert_eq!(count(table, width, height, None), photons, "{table} at {width}×{height}");
-            assert_eq!(count(table, width, height, part), photons, "whatever part is rendered");
+            assert_eq!(count(table, width, height, part), photons, "independent of the crop");
         }
     }
 
     #[test]
-    fn a_scene_is_shared_whatever_is_overridden() {
+    fn overrides_do_not_copy_the_scene() {
         let scene = loaded_of("").scene;
         let overrides = Overrides { width: Some(8), shadows: Some(Shadows::Off), ..Default::default() };
         let planned = plan(&scene, Path::new("a.toml"), &overrides).expect("a plan");
@@ -416,7 +415,7 @@ mod tests {
     }
 
     #[test]
-    fn the_default_output_is_the_scenes_name_in_the_working_directory() {
+    fn default_output_is_named_after_the_scene() {
         assert_eq!(planned("", &Overrides::default()).outputs, [PathBuf::from("my.scene.png")]);
         let scene = "[render]\noutput = \"a/b.exr\"\n";
         let of_scene = planned(scene, &Overrides::default()).outputs;
@@ -425,9 +424,9 @@ mod tests {
         assert_eq!(planned(scene, &overrides).outputs, overrides.outputs);
     }
 
-    /// Neither room may know the other, so each has its list.
+    /// The crates `scene` and `files` do not depend on each other, so each has its own list.
     #[test]
-    fn a_scene_may_name_every_format_that_can_be_written_and_no_other() {
+    fn scene_accepts_exactly_the_writable_formats() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("scene.toml");
         let load = |ending: &str| {
@@ -459,7 +458,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crop_must_lie_inside() {
+    fn crop_must_be_inside_the_image() {
         let text = "[render]\nwidth = 32\nheight = 24\n";
         let with = |x, y, width, height| Overrides {
             crop: Some(Rect { x, y, width, height }),
@@ -475,7 +474,7 @@ mod tests {
     }
 
     #[test]
-    fn exposure_is_for_light_only() {
+    fn exposure_applies_only_to_light() {
         let text = "[render]\nexposure = 2.0\n";
         assert_eq!(planned(text, &Overrides::default()).tone.exposure_stops, 2.0);
         let normals = Overrides { view: Some(View::Normal), ..Default::default() };
@@ -483,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn only_display_values_skip_the_srgb_curve() {
+    fn only_data_views_skip_the_srgb_curve() {
         use crate::film::tone::Transfer;
         for &view in View::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };

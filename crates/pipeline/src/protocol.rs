@@ -1,10 +1,11 @@
 //! Messages between the front ends and the worker.
 //!
-//! A front end sends [`Command`]s and receives [`Event`]s, each with the generation of the request that it is
-//! about; events of older generations are dropped by the receiver. The queue of requests holds one: a newer one
-//! replaces it and cancels the render under way. Preview pictures do not travel in events but in a slot that
-//! holds the latest only ([`Event::Preview`] says that it changed).
+//! A front end sends [`Command`]s and receives [`Event`]s. Each event carries the generation of its request, and the
+//! receiver drops events of older generations. The queue holds one request: a newer one replaces it and cancels the
+//! current render. Preview images are not sent as events but stored in a slot that holds only the latest one, which
+//! [`Event::Preview`] announces.
 
+pub mod reasons;
 mod stage;
 
 use std::path::PathBuf;
@@ -12,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
-pub use super::answers::{CameraEdit, Kept, MovedCamera, Picked, Section, Spot, Thing};
+pub use super::answers::{CameraEdit, ImagePosition, Kept, MovedCamera, Picked, Section, Thing};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
@@ -23,83 +24,82 @@ pub use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 
-/// From a front end to the worker.
+/// A command from a front end to the worker.
 #[derive(Clone, Debug)]
 pub enum Command {
-    /// Render this; whatever is under way is cancelled.
+    /// Cancel the current request and start this one.
     Render(Box<Request>),
-    /// Write the picture as it is now to its files; if some of its pixels have no sample yet, as soon as they have.
+    /// Write the current image to its files, as soon as every pixel has a sample.
     Write,
-    /// Previews are to have this size from now on; the picture at hand is shown again. What is rendered goes on.
+    /// Change the size of previews and show the current image again. Rendering continues.
     Preview(Option<PreviewSize>),
-    /// Put this camera into the scene file; [`Event::CameraKept`] says what came of it. What is rendered goes on.
+    /// Write this camera into the scene file. [`Event::CameraKept`] reports the result. Rendering continues.
     KeepCamera(MovedCamera),
-    /// Put the scene file back as it was before this edit, if nobody changed it since; [`Event::CameraUndone`] says what came of
-    /// it. What is rendered goes on.
+    /// Undo this edit of the scene file unless the file has changed since. [`Event::CameraUndone`] reports the result.
+    /// Rendering continues.
     UndoCamera(CameraEdit),
-    /// Say what is at a place of the picture; [`Event::Picked`] does. What is rendered goes on.
-    Pick(Spot),
-    /// Stop the render under way.
+    /// Identify the object at a position of the image. [`Event::Picked`] reports it. Rendering continues.
+    Pick(ImagePosition),
+    /// Stop the current render.
     Cancel,
-    /// Stop the render under way, and keep a checkpoint of it. A picture that is being written becomes whole, unless
-    /// [`Command::Cancel`] comes too: then a checkpoint takes its place.
+    /// Stop the current render and save a checkpoint. An image that is being written is completed, unless
+    /// [`Command::Cancel`] follows: then a checkpoint is saved instead.
     Suspend,
-    /// Hold the work, or let it go on: that of the newest request, whether it has begun or not. A request that comes
-    /// later is not held.
+    /// Pause or resume the newest request, whether or not it has begun. Later requests are not paused.
     Pause(bool),
-    /// End the worker.
+    /// Stop the worker.
     Quit,
 }
 
-/// One order for a picture.
+/// A request to render an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
-    /// Larger than that of every request before.
+    /// Larger than in all earlier requests.
     pub generation: u64,
     /// The scene file.
     pub scene: PathBuf,
-    /// Changes by the command line and by keys.
+    /// Overrides from the command line and from keys.
     pub overrides: Overrides,
-    /// The preview: a picture of at most this many pixels across and down, with the image's aspect ratio. `None` for no previews.
+    /// Maximum size of previews, which keep the image's aspect ratio. `None` disables previews.
     pub preview: Option<PreviewSize>,
-    /// Whether the finished picture is written to disk.
+    /// Whether to write the finished image.
     pub write: Writing,
-    /// Overrides of the scene's own image, where this request shows something else: its film and its checkpoint are kept. `None`
-    /// for a request of that image.
+    /// Overrides of the scene's own image if this request shows another one; its film and checkpoint are then kept.
+    /// `None` if this request is for the scene's own image.
     pub own: Option<Box<Overrides>>,
-    /// Render again even where nothing changed.
+    /// Render again even if nothing has changed.
     pub force: bool,
-    /// The part of the picture that gets its samples before the rest; the picture is the same in the end.
+    /// Region whose samples are rendered first. The final image does not depend on it.
     pub first: Option<Section>,
 }
 
-/// Whether a finished picture is written to disk.
+/// Whether a finished image is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writing {
-    /// It is not.
+    /// Do not write the image.
     No,
-    /// Write it. If that is impossible, [`Event::WriteFailed`] or [`Event::Refused`] reports it at the beginning and at the end,
-    /// and the picture is rendered and shown all the same.
+    /// Write the image. Failures are reported by [`Event::WriteFailed`] or [`Event::Refused`] at the beginning and at
+    /// the end, and the image is rendered and shown anyway.
     Try,
-    /// Write it. A file that cannot be written fails the request, if possible before anything is rendered.
+    /// Write the image. A file that cannot be written fails the request, before the render if possible.
     Must,
 }
 
-/// Upper bounds of a preview picture, in pixels of square shape.
+/// Maximum size of a preview in square pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewSize {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Center of the image's own pixels that are shown, as many as fit. `None` for the whole image at this size.
-    pub around: Option<Spot>,
+    /// Center of a 1:1 section that shows as many image pixels as fit. `None` to fit the whole image.
+    pub around: Option<ImagePosition>,
 }
 
-/// From the worker to a front end.
+/// An event from the worker to a front end.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// The worker took a request up.
+    /// The worker started a request.
     Started {
         /// Number of the request.
         generation: u64,
@@ -111,23 +111,23 @@ pub enum Event {
         /// The stage and its status.
         stage: StageReport,
     },
-    /// These files were read, or tried: what they hold is what the request is made of. Each such event holds all
-    /// files known so far; a front end watches those of the latest.
+    /// Files that were read or tried, which the request depends on. Each such event contains all files known so far,
+    /// and the front end watches the files of the latest event.
     Files {
         /// Number of the request.
         generation: u64,
-        /// The scene and everything that it names.
+        /// The scene and all files it references.
         files: Vec<FileRead>,
-        /// Number of files that this request read, at the head of the list; earlier requests read the others.
+        /// Number of files at the head of the list that this request read. Earlier requests read the others.
         read: usize,
-        /// After that.
+        /// Time before the first read.
         since: Instant,
     },
-    /// Everything that is there to warn of is known; the picture is yet to be rendered.
+    /// All warnings are known, before the image is rendered.
     Warnings {
         /// Number of the request.
         generation: u64,
-        /// The same as [`Event::Done`] will have.
+        /// The same warnings as in [`Event::Done`].
         warnings: Vec<Diagnostic>,
     },
     /// An asset is loading.
@@ -137,93 +137,93 @@ pub enum Event {
         /// Progress of the asset.
         progress: AssetProgress,
     },
-    /// The scene was understood: these settings hold now.
+    /// The scene is valid and has these effective settings.
     Settings {
         /// Number of the request.
         generation: u64,
         /// The settings.
         settings: Box<Effective>,
-        /// The scene's own camera.
+        /// Camera of the scene.
         camera: Viewpoint,
-        /// The scene's own exposure, in stops.
+        /// Exposure of the scene, in stops.
         exposure: f32,
-        /// The scene's other settings that keys change.
+        /// The scene's values of other settings that keys change.
         own: OwnSettings,
     },
-    /// The scene file could be read.
+    /// The scene file was read.
     Text {
         /// Number of the request.
         generation: u64,
-        /// Text of the scene file; of a model, of the scene that was made for it.
+        /// Text of the scene file, or of the scene generated for a model.
         text: Arc<str>,
     },
-    /// The render went on.
+    /// The render made progress.
     Progress {
         /// Number of the request.
         generation: u64,
         /// Progress of the render.
         progress: RenderProgress,
     },
-    /// A newer picture is in the slot.
+    /// The slot contains a newer preview.
     Preview {
         /// Number of the request.
         generation: u64,
     },
-    /// A picture was written.
+    /// An image was written.
     Written {
         /// Number of the request.
         generation: u64,
         /// The file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file.
         bytes: u64,
-        /// Whether it is the scene's own image, not one that keys changed.
+        /// Whether it is the scene's own image, without changes made by keys.
         is_own: bool,
     },
-    /// State of the scene's own image, in a request that shows something else.
+    /// State of the scene's own image, for a request that shows another one.
     OwnImage {
         /// Number of the request.
         generation: u64,
         /// The state.
         state: OwnState,
     },
-    /// A picture or a report could not be written; a render under way goes on.
+    /// An image or a report could not be written. Rendering continues.
     WriteFailed {
         /// Number of the request.
         generation: u64,
-        /// The picture's file, if the failure is of one alone: nobody knows what it holds now.
+        /// The file, if only one failed. Its content is unknown.
         path: Option<PathBuf>,
         /// The file and the reason.
         message: String,
     },
-    /// A file was written, and what the one that was there had besides its bytes could not be kept.
+    /// A file was replaced, and some metadata of the old file could not be preserved.
     NotKept {
         /// Number of the request.
         generation: u64,
-        /// The file and the properties that were lost.
+        /// The file and the lost metadata.
         message: String,
     },
-    /// No file is written as long as one of them must not be: it is an input, another of them, or something that a person
-    /// did not mean to lose. A render under way goes on.
+    /// No file is written, because at least one must not be: it is an input, is named twice, or contains something that
+    /// glimt did not write. Rendering continues.
     Refused {
         /// Number of the request.
         generation: u64,
-        /// One for each such file, with the way out.
+        /// One diagnostic per such file, with a solution.
         conflicts: Vec<Diagnostic>,
     },
-    /// Something about the checkpoint of the render.
+    /// News about the checkpoint of the render.
     Checkpoint {
         /// Number of the request.
         generation: u64,
-        /// Message about it.
+        /// The news.
         news: CheckpointNews,
     },
-    /// [`Command::Write`] waits until every pixel has a sample.
+    /// [`Command::Write`] is postponed until every pixel has a sample.
     WritePostponed {
         /// Number of the request.
         generation: u64,
     },
-    /// [`Command::Write`] is done, and every file was written.
+    /// [`Command::Write`] has written all files.
     WriteDone {
         /// Number of the request.
         generation: u64,
@@ -234,21 +234,21 @@ pub enum Event {
     CameraKept {
         /// Number of the request.
         generation: u64,
-        /// The file with the camera, or the reason why glimt wrote nothing.
+        /// The file with the camera, or why glimt did not write it.
         outcome: Result<Kept, String>,
     },
     /// Answer to [`Command::UndoCamera`].
     CameraUndone {
         /// Number of the request.
         generation: u64,
-        /// The file that is as before, or the reason why glimt wrote nothing.
+        /// The restored file, or why glimt did not write it.
         outcome: Result<PathBuf, String>,
     },
     /// Answer to [`Command::Pick`].
     Picked {
         /// Number of the request.
         generation: u64,
-        /// The object there.
+        /// The object and the color.
         picked: Box<Picked>,
     },
     /// The request is finished.
@@ -257,187 +257,187 @@ pub enum Event {
         generation: u64,
         /// Report of the request.
         report: Box<Report>,
-        /// Warnings, and the conflicts of [`Event::Refused`] that still hold.
+        /// Warnings, and the conflicts of [`Event::Refused`] that remain.
         warnings: Vec<Diagnostic>,
-        /// Whether the request found everything as it was, so that nothing was rendered and the same picture shown.
+        /// Whether nothing had changed, so that the request rendered nothing and shows the same image.
         unchanged: bool,
     },
-    /// The request could not be done. The last picture stands.
+    /// The request failed. The previous image remains.
     Failed {
         /// Number of the request.
         generation: u64,
         /// Why.
         failure: Failure,
     },
-    /// The scene of the request could not be read, as [`Event::Failed`] has said, and the last good one took its place: its render
-    /// ended.
+    /// The render of the last good scene ended. It replaced the request's own scene, which could not be read, as
+    /// [`Event::Failed`] reported.
     LastGoodEnded {
         /// Number of the request.
         generation: u64,
-        /// End of the render.
+        /// How the render ended.
         end: LastGoodEnd,
     },
-    /// The request was stopped by a newer one or by [`Command::Cancel`].
+    /// The request was cancelled by a newer one or by [`Command::Cancel`].
     Cancelled {
         /// Number of the request.
         generation: u64,
     },
 }
 
-/// State of the scene's own image: the image of the scene file as saved, with the overrides of the command line.
+/// State of the scene's own image: the saved scene with the overrides of the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OwnState {
-    /// Its files hold it.
+    /// All its files contain it.
     Written,
-    /// Some of its samples are there.
+    /// Some of its samples are rendered.
     Begun {
-        /// Whether the request adds samples to it: it shows the same film in another way.
+        /// Whether the request adds samples to it, because it shows the same film in another way.
         is_rendering: bool,
     },
-    /// Nothing of it has been rendered.
+    /// None of its samples are rendered.
     NotBegun,
 }
 
 /// News about a checkpoint.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CheckpointNews {
-    /// It was written.
+    /// The checkpoint was written.
     Written {
         /// The file.
         path: PathBuf,
     },
-    /// It could not be written; the render goes on.
+    /// The checkpoint could not be written. The render continues.
     Failed {
         /// The file and the reason.
         message: String,
     },
-    /// The render goes on from it.
+    /// The render resumes from the checkpoint.
     Resumed {
         /// The file.
         path: PathBuf,
-        /// Samples that every pixel has which is to have more.
+        /// Samples of every pixel that needs more.
         samples: u32,
     },
-    /// The render was to go on from it, and begins anew: it is not there.
+    /// The checkpoint to resume from does not exist, so the render starts from zero.
     Absent {
         /// The file.
         path: PathBuf,
     },
-    /// It is of this picture, and the call does not ask for it.
+    /// A checkpoint of this image exists, but the command line does not ask to resume.
     Ignored {
         /// The file.
         path: PathBuf,
     },
-    /// It is there, and the render begins anew: why. Also a part that is not whole.
+    /// The render ignores a checkpoint or an incomplete part and starts from zero.
     Unused {
         /// The file.
         path: PathBuf,
-        /// The reason: it is of another picture, has more samples than asked for, or is damaged.
+        /// The reason: another image, more samples than requested, or damage.
         why: String,
     },
-    /// The output is this part already.
+    /// The output file already contains this part.
     Finished {
         /// The file.
         path: PathBuf,
     },
-    /// That of another render made way for this one's.
+    /// The checkpoint of another render was renamed.
     SetAside {
         /// Its new name.
         path: PathBuf,
     },
 }
 
-/// Why a request could not be done.
+/// Why a request failed.
 #[derive(Clone, Debug)]
 pub enum Failure {
-    /// The scene or something it names is wrong (exit code 2): errors and warnings.
+    /// The scene or a file it references is invalid (exit code 2): errors and warnings.
     Scene(Vec<Diagnostic>),
-    /// The work failed (exit code 1): a file that could not be written, a worker that died.
+    /// The work failed (exit code 1), for example because a file could not be written or the worker died.
     Work(String),
 }
 
-/// End of a render of the last good scene.
+/// How the render of the last good scene ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LastGoodEnd {
-    /// The picture is finished.
+    /// The image is finished.
     Finished {
-        /// Whether it was finished before: nothing was rendered or written, and the same picture shown.
+        /// Whether it was finished before, so that nothing was rendered or written.
         unchanged: bool,
     },
-    /// The picture is not finished: the render was stopped, or no scene could be read so far.
+    /// The image is not finished: the render was stopped, or no scene has been read yet.
     Stopped,
 }
 
-/// An asset that is loading.
+/// Loading progress of an asset.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssetProgress {
-    /// Its name: a texture's name in the scene, a mesh's file name.
+    /// Name of a texture in the scene, or a mesh's file name.
     pub name: String,
     /// Work units done.
     pub done: u64,
-    /// Work units in all; `done == total` ends it.
+    /// Total work units. Loading has ended when `done == total`.
     pub total: u64,
 }
 
 /// Progress of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderProgress {
-    /// From 0 to 1, never falling within a generation; 1 when the render is over.
+    /// From 0 to 1. Never decreases within a generation, and is 1 when the render is over.
     pub fraction: f64,
     /// Seconds since the render stage began.
     pub elapsed_seconds: f64,
-    /// Seconds in which earlier requests rendered the samples that this one goes on from.
+    /// Seconds that earlier requests spent on the samples this one continues from.
     pub earlier_seconds: f64,
-    /// Expected seconds until the end. `None` until the rate is known.
+    /// Expected remaining seconds. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
-    /// Samples per pixel so far, on average, rounded down.
+    /// Average samples per pixel so far, rounded down.
     pub samples: u32,
-    /// The exact average.
+    /// Exact average of the samples per pixel.
     pub mean_samples: f64,
-    /// Samples per pixel that there will be, on average, as far as that is known.
+    /// Expected final average of the samples per pixel.
     pub total_samples: u32,
-    /// Whether every pixel gets `total_samples`: neither noise nor time ends the render.
+    /// Whether every pixel gets `total_samples`, because neither noise nor time ends the render.
     pub is_total_fixed: bool,
-    /// Noise so far. `None` before half a second and 16 samples.
+    /// Noise so far. `None` during the first half second and the first 16 samples.
     pub noise: Option<NoiseProgress>,
 }
 
-/// Noise now, and noise to come.
+/// Current and predicted noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseProgress {
-    /// [`Film::relative_error`](crate::film::Film::relative_error), as it was measured last.
+    /// Last measured [`Film::relative_error`](crate::film::Film::relative_error).
     pub now: f64,
-    /// Seconds from the beginning of the render stage to that measurement.
+    /// Seconds from the start of the render stage to the measurement.
     pub seconds: f64,
-    /// A round level below that, and seconds until then. `None` if the render ends first, and if nobody knows how noise falls:
-    /// with photons and with `error`.
+    /// The next lower round level, and the seconds until then. `None` if the render ends earlier or the noise cannot be
+    /// predicted: with photons and with `error`.
     pub next: Option<(f64, f64)>,
 }
 
-/// The slot that holds the latest preview.
+/// Slot that holds the latest preview.
 pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
 
-/// A preview picture with what it is of.
+/// A preview and the image it shows.
 #[derive(Clone, Debug)]
 pub struct LatestPreview {
     /// Number of the request.
     pub generation: u64,
-    /// The picture, at most of the requested size.
+    /// The preview, within the requested size.
     pub picture: Arc<Picture>,
-    /// The numbers at both ends of the range that it is stretched to: near and far of distances, else 0 and the greatest.
+    /// Range of values mapped to black and white: the nearest and farthest distance, or 0 and the maximum.
     pub range: Option<[f32; 2]>,
-    /// The part of the image that is shown pixel by pixel. `None` for the whole image.
+    /// Section of the image that is shown at 1:1. `None` for the whole image.
     pub section: Option<Section>,
-    /// Whether it lacks the light that photons bring, since they are still being traced.
+    /// Whether the preview lacks the photons' light, because they are still being traced.
     pub lacks_photons: bool,
-    /// The image that it shows. `None` if it lacks the light of photons.
+    /// The image that the preview shows. `None` if it lacks the photons' light.
     pub source: Option<PreviewSource>,
 }
 
-/// The image that a preview shows, and how far its render is.
+/// The image that a preview shows, and whether it is finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PreviewSource {
-    /// Previews with the same key show the same image, at any size and with any number of its samples.
+    /// Previews with the same key show the same image, at any size and number of samples.
     pub image: Key,
     /// Whether the image has all its samples.
     pub is_finished: bool,

@@ -1,30 +1,30 @@
-//! The report of a finished request, and its file.
+//! Report of a finished request, and its JSON file.
 
 pub(super) mod finish;
 mod marks;
 
-pub(super) use self::marks::Marks;
+pub(super) use self::marks::ReportMarks;
 use super::protocol::StageReport;
 use super::settings::Effective;
 
-/// The report of one finished request: the JSON of `--report`.
+/// Report of a finished request, written as JSON with `--report`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
-    /// Version.
+    /// Version of glimt.
     pub glimt: &'static str,
-    /// The scene file as named by the caller.
+    /// Scene file as named by the caller.
     pub scene: String,
-    /// The picture.
+    /// The image.
     pub image: ImageReport,
-    /// The settings it was made with.
+    /// Effective settings.
     pub settings: Effective,
-    /// The lights, and how vertices sample them.
+    /// The lights and how they are sampled.
     pub lights: LightsReport,
-    /// The photons that were sent for it; none where nothing gathers them.
+    /// The traced photons. `None` if the image does not use photons.
     pub photons: Option<PhotonsReport>,
     /// All eight stages, in order.
     pub stages: Vec<StageReport>,
-    /// Counters of the work.
+    /// Counters.
     pub counters: Counters,
     /// Wall-clock time of the request.
     pub seconds: f64,
@@ -32,128 +32,128 @@ pub struct Report {
     pub peak_memory_bytes: u64,
 }
 
-/// The picture in a report.
+/// The image in a report.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ImageReport {
-    /// The first output, or none where nothing was written.
+    /// First output file. `None` if no file was written.
     pub path: Option<String>,
-    /// Every output.
+    /// All output files.
     pub paths: Vec<String>,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
     /// Samples per pixel.
     pub samples: SampleCounts,
-    /// The error to expect, relative to the picture's mean luminance; see
-    /// [`Film::relative_error`](crate::film::Film::relative_error). None below two samples a pixel.
+    /// Expected error, relative to the mean luminance of the image: see
+    /// [`Film::relative_error`](crate::film::Film::relative_error). `None` below two samples per pixel.
     pub error: Option<f64>,
-    /// Seconds that it was rendered for: by this request, and by those before that it goes on from.
+    /// Render time in seconds, including earlier requests that this one continued.
     pub render_seconds: f64,
-    /// Whether every pixel got the requested samples.
+    /// Whether every pixel has the requested samples.
     pub complete: bool,
-    /// Numbers at both ends of a view that is stretched to its range. `depth`: the least distance, which is white, and the
-    /// greatest. Others: 0, and the greatest number, which is white.
+    /// Range of values mapped to black and white. `depth`: the minimum distance (white) and the maximum. Other data: 0
+    /// and the maximum (white).
     pub range: Option<[f32; 2]>,
 }
 
-/// Samples per pixel over a picture.
+/// Statistics of the samples per pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct SampleCounts {
-    /// Fewest.
+    /// Minimum.
     pub min: u32,
-    /// On average.
+    /// Mean.
     pub mean: f64,
-    /// Most.
+    /// Maximum.
     pub max: u32,
 }
 
-/// The lights of a picture.
+/// The lights in a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct LightsReport {
-    /// Number of lights; a mesh counts for each of its emitting materials.
+    /// Number of lights. A mesh counts once per emissive material.
     pub count: u64,
-    /// Lights that each vertex samples.
+    /// Which lights each vertex samples.
     pub sampled: LightsSampled,
-    /// Lights that a vertex picks: 32 × `shadow_samples` in whitted, 4 × in path; 0 without a tree.
+    /// Lights that a vertex samples from the tree: 32 × `shadow_samples` in whitted, 4 × in path; 0 without a tree.
     pub picks: u64,
-    /// Nodes of the tree that it picks from.
+    /// Nodes of the light tree.
     pub tree_nodes: u64,
-    /// Bytes held by trees over lights, and over the triangles of lights.
+    /// Bytes of the trees over lights and over the triangles of lights.
     pub memory_bytes: u64,
 }
 
-/// The photons of a picture.
+/// The photons in a report.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PhotonsReport {
-    /// Photons that a pass sends out.
+    /// Photons per pass.
     pub count: u64,
-    /// Passes that were sent; others were kept from before.
+    /// Passes traced by this request; others were cached.
     pub passes: u64,
-    /// Photons that were sent.
+    /// Photons emitted.
     pub emitted: u64,
-    /// Photons that were stored.
+    /// Photons stored.
     pub stored: u64,
-    /// Texture look-ups on their ways.
+    /// Texture lookups by photons.
     #[serde(skip)]
     pub lookups: u64,
-    /// Seconds that it took to send and store them.
+    /// Seconds spent on emitting and storing photons.
     pub seconds: f64,
-    /// Photons sent in each of these seconds.
+    /// Photons emitted per second.
     pub per_second: f64,
-    /// Radius of the first pass's kernel for caustics.
+    /// Kernel radius of the first pass for caustics.
     pub caustic_radius: f32,
-    /// Radius of the first pass's kernel for what is thrown back from caustics.
+    /// Kernel radius of the first pass for light reflected from caustics.
     pub bounced_radius: f32,
-    /// Bytes held by maps that are kept.
+    /// Bytes of the cached maps.
     pub kept_memory_bytes: u64,
-    /// Most bytes of maps that were in use at once.
+    /// Maximum number of bytes of maps in use at once.
     pub used_memory_bytes: u64,
 }
 
-/// Selection of lights at a vertex.
+/// Which lights a vertex samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LightsSampled {
-    /// All of them.
+    /// All lights.
     All,
-    /// Some lights that it picks by their expected contribution.
+    /// A subset sampled by expected contribution.
     Picked,
 }
 
-/// Counts of the work of a request.
+/// Work counters of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Counters {
-    /// Triangles over all mesh instances and single triangles.
+    /// Triangles of all mesh instances, and single triangles.
     pub triangles: u64,
-    /// Shapes of any kind; a mesh instance counts as one.
+    /// Shapes of all kinds. A mesh instance counts as one.
     pub objects: u64,
-    /// Rays from the camera.
+    /// Camera rays.
     pub camera_rays: u64,
-    /// Rays towards lights.
+    /// Shadow rays.
     pub shadow_rays: u64,
-    /// Mirrored rays.
+    /// Reflected rays.
     pub reflected_rays: u64,
     /// Refracted rays.
     pub refracted_rays: u64,
-    /// Rays that go on from diffuse and glossy surfaces.
+    /// Rays scattered by diffuse and glossy surfaces.
     pub scattered_rays: u64,
-    /// Photons sent out.
+    /// Photons emitted.
     pub photons_emitted: u64,
     /// Photons stored.
     pub photons_stored: u64,
     /// Texels read from files.
     pub texels_loaded: u64,
-    /// Bytes held by images and their mipmap levels.
+    /// Bytes of images and their mipmaps.
     pub texture_memory_bytes: u64,
-    /// Texture look-ups.
+    /// Texture lookups.
     pub texture_lookups: u64,
-    /// Samples that were not finite and count as 0.
+    /// Non-finite samples, which count as 0.
     pub non_finite_samples: u64,
-    /// Bytes held by trees.
+    /// Bytes of acceleration structures.
     pub accel_memory_bytes: u64,
-    /// FilmCache kept: that of the picture, and those that a toggle that is switched back finds again.
+    /// Films in memory: the image's, and others that a toggle can return to.
     pub films: u64,
-    /// Bytes held by them.
+    /// Bytes of these films.
     pub film_memory_bytes: u64,
 }

@@ -1,18 +1,18 @@
-//! Requests one after another on the thread of the caller, whose pictures stay in memory: for programs that measure.
+//! Synchronous rendering of images in memory, for programs that measure.
 
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc;
 
-use super::engine::{Engine, Interruption, Means, Meanwhile, Orders};
+use super::engine::{Engine, EngineConfig, Interruption, Orders, RequestContext};
 pub use super::engine::{Rendered, Unrendered};
-use super::errands::Errand;
 use super::protocol::{PreviewSize, PreviewSlot, Request, Writing};
+use super::queries::Query;
 use super::settings::Overrides;
 use super::sink::Sink;
 use crate::control::CancelToken;
 
-/// An engine with what it keeps from picture to picture.
+/// An engine and its caches.
 pub struct Session {
     engine: Engine,
     generation: u64,
@@ -20,15 +20,15 @@ pub struct Session {
 
 impl Default for Session {
     fn default() -> Self {
-        Self { engine: Engine::new(Means::default(), Arc::default()), generation: 0 }
+        Self { engine: Engine::new(EngineConfig::default(), Arc::default()), generation: 0 }
     }
 }
 
 impl Session {
-    /// Render from an empty film and write nothing.
+    /// Renders from an empty film without writing files.
     ///
     /// # Errors
-    /// Why there is no picture.
+    /// Why no image was rendered.
     pub fn render(
         &mut self,
         scene: &Path,
@@ -46,21 +46,21 @@ impl Session {
             own: None,
             force: true,
         };
-        // Nobody listens: what came of it is given back.
+        // The result is returned, so the events have no receiver.
         let (events, _) = mpsc::channel();
         let sink =
             Sink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
-        let meanwhile = Meanwhile::new(token, token, &NoOrders);
-        self.engine.rendered(&request, &sink, &meanwhile)
+        let context = RequestContext::new(token, token, &NoOrders);
+        self.engine.rendered(&request, &sink, &context)
     }
 
-    /// Whether a path leads to a file that the last picture is made of.
+    /// Whether a path leads to a file that the last image depends on.
     pub fn reads(&self, path: &Path) -> bool {
         self.engine.reads(path)
     }
 }
 
-/// Nobody gives any.
+/// Orders of a request that has no front end.
 pub(super) struct NoOrders;
 
 impl Orders for NoOrders {
@@ -76,7 +76,7 @@ impl Orders for NoOrders {
         None
     }
 
-    fn take_errand(&self) -> Option<Errand> {
+    fn take_query(&self) -> Option<Query> {
         None
     }
 
@@ -94,7 +94,7 @@ mod tests {
         [materials.m]\n[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"m\"\n[[light]]\n";
 
     #[test]
-    fn pictures_come_back_with_what_they_are_made_of() {
+    fn images_have_keys_and_reports() {
         let folder = tempfile::tempdir().expect("a folder");
         let scene = folder.path().join("a.toml");
         std::fs::write(&scene, SCENE).expect("written");
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_and_what_is_cancelled_gives_no_picture() {
+    fn failed_or_cancelled_render_has_no_image() {
         let token = CancelToken::new();
         let missing = Session::default().render(Path::new("none.toml"), &Overrides::default(), &token);
         assert!(matches!(missing, Err(Unrendered::Failed(Failure::Scene(_)))));

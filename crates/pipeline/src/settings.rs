@@ -1,4 +1,4 @@
-//! Overrides of a scene by the command line and by keys, and the settings that result.
+//! Overrides of a scene's settings by the command line and keys, and the effective settings.
 
 use std::path::PathBuf;
 
@@ -14,18 +14,18 @@ macro_rules! overrides {
     ($(
         $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
-        /// Changes to a scene's settings for this run; `None` leaves the scene's own.
+        /// Overrides of a scene's settings for this run. `None` keeps the scene's value.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Overrides {
-            /// Values in place of those in the file: texts `TABLE.KEY=VALUE`. The other changes come after these.
+            /// Overrides of scene keys as `TABLE.KEY=VALUE`, applied before the other overrides.
             pub sets: Vec<String>,
-            /// Files to write; empty: the scene's own.
+            /// Output files. Empty for the scene's own.
             pub outputs: Vec<PathBuf>,
-            /// File for the report of each finished request, as JSON.
+            /// JSON file for the report of each finished request.
             pub report: Option<PathBuf>,
-            /// Whether the report and the picture that nobody named may replace a file that glimt did not write.
+            /// Whether the report and the default image may replace files that glimt did not write.
             pub replaces_foreign: bool,
-            /// Budget of time: stop rendering after this long, with what there is.
+            /// Time limit in seconds, after which the render stops with the samples it has.
             pub time_seconds: Option<f64>,
             /// Photon maps.
             pub photons: Option<bool>,
@@ -33,33 +33,33 @@ macro_rules! overrides {
             pub dof: Option<bool>,
             /// The view: beauty or an AOV.
             pub view: Option<View>,
-            /// The side from which a model is seen, in place of its own camera.
+            /// Side from which a model is seen, instead of its own camera.
             pub from: Option<Side>,
-            /// The axis of a model that points upwards, in place of the usual one of its format.
+            /// Up axis of a model, instead of its format's default.
             pub up: Option<UpAxis>,
-            /// The camera.
+            /// Movement of the camera.
             pub camera: CameraChange,
-            /// Layers beside the picture in EXR files.
+            /// Layers in addition to the image in EXR files.
             pub layers: Vec<Layer>,
-            /// The picture of a turntable. `None` for a single picture.
+            /// Frame of a turntable. `None` for a still image.
             pub turn: Option<Turn>,
-            /// Render these pixels only; the rest of the picture stays black.
+            /// Pixels to render. The rest of the image stays black.
             pub crop: Option<Rect>,
-            /// Threads; `None` or 0: one per core.
+            /// Number of threads. `None` or 0 for one per core.
             pub threads: Option<usize>,
             /// Bits per channel of PNG files: 8 or 16.
             pub bit_depth: Option<u8>,
-            /// The part of the picture that this process renders, from 1, and the number of parts.
+            /// Part of the image that this process renders, from 1, and the number of parts.
             pub shard: Option<(u32, u32)>,
             /// Checkpoints of the render.
             pub checkpoints: Checkpoints,
-            /// Most bytes that the render may need.
+            /// Maximum number of bytes that the render may need.
             pub memory: Option<u64>,
             $($(#[doc = $doc])* pub $name: Option<$type>,)*
         }
 
         impl Overrides {
-            /// The settings of a scene with these changes.
+            /// Returns a scene's settings with these overrides.
             pub(super) fn applied(&self, to: &Render) -> Render {
                 Render { $($name: self.$name.unwrap_or(to.$name),)* ..*to }
             }
@@ -72,83 +72,83 @@ render_keys!(overrides, changed);
 choice! {
     /// Sides from which a model is seen.
     pub enum Side {
-        /// The front: +z, of an STL file −y.
+        /// The front: +z, or −y in STL files.
         Front = "front",
         /// The back.
         Back = "back",
-        /// Its left side in the picture of the front.
+        /// The left as seen in the front view.
         Left = "left",
-        /// Its right side in the picture of the front.
+        /// The right as seen in the front view.
         Right = "right",
-        /// Above.
+        /// From above.
         Top = "top",
-        /// Below, without the ground.
+        /// From below, without the ground.
         Bottom = "bottom",
-        /// Before it, from above and to its right.
+        /// From the front, above and right.
         Iso = "iso",
     }
 }
 
 choice! {
-    /// Layers beside the picture in EXR files.
+    /// Extra channels (AOVs) in EXR files.
     pub enum Layer {
         /// Diffuse reflectance.
         Albedo = "albedo",
-        /// Shading normals in the world's axes, from -1 to 1; 0 where nothing is.
+        /// Shading normal in world space, from -1 to 1; 0 for no hit.
         Normal = "normal",
-        /// Distance along the view axis, 0 where nothing is.
+        /// Distance along the view axis; 0 for no hit.
         Depth = "depth",
-        /// Variance of the luminance of each pixel.
+        /// Variance of the pixel's luminance.
         Variance = "variance",
-        /// Samples of each pixel.
+        /// Samples per pixel.
         Samples = "samples",
-        /// Ambient part of Phong.
+        /// Ambient component of Phong materials.
         Ambient = "ambient",
-        /// Diffuse part of the light.
+        /// Diffuse component of the light.
         Diffuse = "diffuse",
-        /// Specular part of the light.
+        /// Specular component of the light.
         Specular = "specular",
-        /// Light that surfaces send out, and that of the background.
+        /// Light emitted by surfaces and the background.
         Emission = "emission",
     }
 }
 
 choice! {
-    /// The axis of a mesh file that points upwards.
+    /// Up axis of a mesh file.
     pub enum UpAxis {
-        /// x: −z is the front's right.
+        /// x axis points up.
         X = "x",
-        /// y, as glTF has it, and most OBJ and PLY files.
+        /// y axis points up, as in glTF and most OBJ and PLY files.
         Y = "y",
-        /// z, as programs for construction and printing have it.
+        /// z axis points up, as in CAD and 3D printing.
         Z = "z",
     }
 }
 
-/// Checkpoints of a render, beside its output.
+/// When checkpoints of a render are saved next to its output, and used.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Checkpoints {
-    /// Seconds between two of them; 0 for none.
+    /// Seconds between checkpoints. 0 disables them.
     pub seconds: f64,
-    /// Whether a render goes on from one.
+    /// Whether a render resumes from a checkpoint.
     pub resume: Resume,
-    /// Whether the last one stays when the picture is written.
+    /// Whether the last checkpoint is kept when the image is written.
     pub are_kept: bool,
 }
 
-/// Whether a render goes on from a checkpoint.
+/// Whether a render resumes from a checkpoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Resume {
-    /// It begins anew.
+    /// Start from zero.
     #[default]
     No,
-    /// It goes on from the checkpoint that is there; one of another picture is an error.
+    /// Resume from the existing checkpoint. A checkpoint of another image is an error.
     Asked,
-    /// It goes on from a checkpoint of the same picture, and leaves others alone.
+    /// Resume from a checkpoint of the same image, and ignore others.
     IfSame,
 }
 
-/// Settings of the scene itself, which keys change for a run.
+/// Settings of the scene that keys override.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OwnSettings {
     /// Method.
@@ -159,16 +159,16 @@ pub struct OwnSettings {
     pub photons: bool,
 }
 
-/// The settings a request renders with, for status lines.
+/// Effective settings of a request, for status lines.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Effective {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Samples per pixel, at most.
+    /// Maximum samples per pixel.
     pub samples: u32,
-    /// Noise threshold of a tile, relative to its brightness; 0: no threshold.
+    /// Noise target of a tile, relative to its brightness. 0 for none.
     pub error: f32,
     /// Method.
     #[serde(serialize_with = "choice::serialize")]
@@ -176,7 +176,7 @@ pub struct Effective {
     /// Shadows.
     #[serde(serialize_with = "choice::serialize")]
     pub shadows: Shadows,
-    /// Most radiance that a path brings by one vertex after its first reflection, which makes a bias; 0: no such limit.
+    /// Limit on indirect radiance per bounce, which causes bias. 0 for none.
     pub clamp: f32,
     /// Whether photons are on.
     pub photons: bool,
@@ -188,13 +188,13 @@ pub struct Effective {
     /// The view: beauty or an AOV.
     #[serde(serialize_with = "choice::serialize")]
     pub view: View,
-    /// In stops.
+    /// Exposure in stops.
     pub exposure: f32,
-    /// The seed.
+    /// Random seed.
     pub seed: u32,
-    /// Threads that render.
+    /// Number of render threads.
     pub threads: usize,
-    /// The files the picture is written to.
+    /// Output files.
     #[serde(serialize_with = "lossy_paths")]
     pub outputs: Vec<PathBuf>,
 }
@@ -222,7 +222,7 @@ impl Effective {
     }
 }
 
-/// Names that are not UTF-8 must not keep a report from being written.
+/// Serializes paths lossily, because a report must be written even if a name is not UTF-8.
 fn lossy_paths<S: serde::Serializer>(paths: &[PathBuf], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(paths.iter().map(|path| path.to_string_lossy()))
 }

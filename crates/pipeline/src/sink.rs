@@ -1,4 +1,4 @@
-//! The sink of a request's events: each carries the request's generation.
+//! Sender of a request's events, each of which carries the request's generation.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,13 +14,13 @@ use super::watch::content::FileRead;
 use crate::film::Picture;
 use crate::scene::diagnostic::Diagnostic;
 
-/// Sends the events of one request. A front end that is gone is no error.
+/// Sends the events of one request. Ignores a front end that has gone.
 #[derive(Clone, Debug)]
 pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// First and last fraction of progress, if the render is a part of the work. `None` if it is all of it.
+    /// Progress fractions at the begin and end of the render if it is only a part of the work.
     pub(super) within: Option<[f64; 2]>,
 }
 
@@ -33,7 +33,7 @@ impl Sink {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
-    /// The same for a part of the work, by the part of all that is done at its begin and at its end.
+    /// Returns a sink for a part of the work that spans these progress fractions.
     pub(super) fn within(&self, ends: [f64; 2]) -> Self {
         Self { within: Some(ends), ..self.clone() }
     }
@@ -41,7 +41,7 @@ impl Sink {
     pub(super) fn progress(&self, mut progress: RenderProgress) {
         if let Some([begin, end]) = self.within {
             progress.fraction = begin + progress.fraction * (end - begin);
-            // The seconds of what follows are not known.
+            // The duration of the following work is unknown.
             progress.eta_seconds = progress.eta_seconds.filter(|_| end == 1.0);
         }
         self.send(Event::Progress { generation: self.generation, progress });
@@ -91,7 +91,7 @@ impl Sink {
         self.put(LatestPreview { generation, picture, range, section, lacks_photons: false, source });
     }
 
-    /// A picture that lacks the light of photons, before there are any.
+    /// Sends a preview that lacks the photons' light, before any are traced.
     pub(super) fn preview_without_photons(&self, picture: Picture) {
         let (generation, picture) = (self.generation, Arc::new(picture));
         let (range, section, source) = (None, None, None);
@@ -103,8 +103,8 @@ impl Sink {
         self.send(Event::Preview { generation: self.generation });
     }
 
-    /// Reports the loading of one asset: `load` reports to the progress sink that it gets. If loading succeeds, its end is
-    /// reported whatever `load` did.
+    /// Reports the loading of an asset. `load` gets a progress callback. After a success, completion is reported even
+    /// if `load` did not.
     pub(super) fn asset<T, E>(
         &self,
         name: &str,
@@ -130,7 +130,7 @@ impl Sink {
     }
 }
 
-/// Steps of an asset's bar: no more events than that.
+/// Maximum number of progress steps of an asset.
 const PARTS: u64 = 100;
 
 #[cfg(test)]
@@ -139,7 +139,7 @@ mod tests {
     use std::sync::mpsc;
 
     #[test]
-    fn an_asset_is_said_at_most_a_hundred_times_and_ends() {
+    fn asset_progress_is_limited_and_ends() {
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_failed_does_not_end() {
+    fn failed_asset_does_not_end() {
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         sink.asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");

@@ -1,27 +1,27 @@
-//! The table of stages as it fills: each is timed and said, when it begins and when it ends.
+//! The table of stages: times each stage and reports its begin and end.
 
-use super::pace::Stopwatch;
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;
 use super::stages::{Staged, Stop};
+use super::stopwatch::Stopwatch;
 use crate::control::CancelToken;
 use crate::system::cpu_time::process_cpu_seconds;
 
-/// The stages of one request.
+/// Stages of one request.
 pub(super) struct StageTable<'a> {
     pub(super) sink: &'a Sink,
-    /// Token that pauses work: pauses do not count as time.
+    /// Token that pauses work. Pauses do not count.
     pub(super) token: &'a CancelToken,
     pub(super) stages: Vec<StageReport>,
-    /// Whether the table reports nothing.
+    /// Whether events are suppressed.
     pub(super) is_silent: bool,
 }
 
 impl StageTable<'_> {
-    /// Do one stage.
+    /// Runs a stage.
     ///
     /// # Errors
-    /// Those of the work.
+    /// Errors of the work.
     pub(super) fn run<T>(
         &mut self,
         name: Stage,

@@ -1,5 +1,4 @@
-//! The files that a request writes, held against those that it reads, against each other, and against what a person
-//! did not mean to lose.
+//! Checks of output files against the inputs, against each other, and against files that the user did not mean to lose.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -7,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, Inputs, OnDisk};
 use super::plan::{NamedBy, Plan};
-use super::render::keeping::path_of as checkpoint_of;
-use super::report::Marks;
+use super::render::checkpointer::path_of as checkpoint_of;
+use super::report::ReportMarks;
 use super::sink::Sink;
+use crate::messages::SAME_FILE;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{FolderSweep, Guard};
 use crate::output::{
@@ -21,34 +21,33 @@ use crate::scene::is_mesh;
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Target<'a> {
+pub(super) struct OutputTarget<'a> {
     path: &'a Path,
-    kind: Kind,
+    kind: TargetKind,
 }
 
-impl<'a> Target<'a> {
+impl<'a> OutputTarget<'a> {
     /// An image of the plan.
     pub(super) fn picture(plan: &Plan, path: &'a Path) -> Self {
-        Self { path, kind: Kind::Picture(plan.named_by) }
+        Self { path, kind: TargetKind::Picture(plan.named_by) }
     }
 
     /// A report.
     pub(super) fn report(path: &'a Path) -> Self {
-        Self { path, kind: Kind::Report }
+        Self { path, kind: TargetKind::Report }
     }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum TargetKind {
     Picture(NamedBy),
     Report,
 }
 
-/// Everything that keeps the files of this plan from being written, one for each of them. It is what holds now: links
-/// and files may change.
+/// Returns one diagnostic for each file of the plan that must not be written now. Links and files may change later.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     let inputs = inputs.on_disk();
-    // Numbers keep those apart that are still to come.
+    // The numbers of later frames keep their files apart.
     let mut first = HashMap::new();
     for target in targets_now(plan) {
         if let Some(identity) = FileIdentity::of(target.path) {
@@ -56,21 +55,22 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
         }
     }
     let twin =
-        |target: Target<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
+        |target: OutputTarget<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
     let each = targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs, twin));
-    each.chain(linked(plan)).collect()
+    each.chain(linked_frames(plan)).collect()
 }
 
-/// Pictures of a turntable that are one file by links: the later one would replace the earlier one.
-fn linked(plan: &Plan) -> Vec<Diagnostic> {
+/// Returns diagnostics for turntable frames that links make the same file, so that a later frame would replace an
+/// earlier one.
+fn linked_frames(plan: &Plan) -> Vec<Diagnostic> {
     let (mut seen, mut found) = (HashMap::new(), Vec::new());
-    for path in plan.outputs.iter().chain(&plan.to_come).filter(|_| !plan.to_come.is_empty()) {
+    for path in plan.outputs.iter().chain(&plan.later_outputs).filter(|_| !plan.later_outputs.is_empty()) {
         let Some(identity) = FileIdentity::of(path) else { continue };
         match seen.entry(identity) {
             Entry::Vacant(new) => drop(new.insert(path)),
             Entry::Occupied(twin) if *twin.get() != path => {
-                let target = Target { path, kind: Kind::Picture(plan.named_by) };
-                found.push(is_twin(plan, target, twin.get()));
+                let target = OutputTarget { path, kind: TargetKind::Picture(plan.named_by) };
+                found.push(same_file_error(plan, target, twin.get()));
             }
             Entry::Occupied(_) => {}
         }
@@ -78,21 +78,22 @@ fn linked(plan: &Plan) -> Vec<Diagnostic> {
     found
 }
 
-/// Writes a file of the plan, and says what of the one that was there could not be kept; unless it is found at the last moment that it must not be.
+/// Writes a file of the plan and reports lost metadata of the replaced file. Checks for conflicts again at the last
+/// moment.
 ///
 /// # Errors
-/// Those of writing; [`OutputError::Refused`].
+/// Errors of writing, and [`OutputError::Refused`].
 pub(super) fn guarded<'a, T>(
     plan: &'a Plan,
     inputs: &Inputs,
-    (target, sweep): (Target<'a>, Option<&FolderSweep>),
+    (target, sweep): (OutputTarget<'a>, Option<&FolderSweep>),
     sink: &Sink,
     write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
         let inputs = inputs.on_disk();
-        // Targets were compared when the write stage began; since then only links can have changed.
-        let twin = |target: Target<'_>, at: &FileIdentity| {
+        // Targets were compared when the write stage began. Since then, only links can have changed.
+        let twin = |target: OutputTarget<'_>, at: &FileIdentity| {
             if real == target.path {
                 return None;
             }
@@ -100,7 +101,7 @@ pub(super) fn guarded<'a, T>(
             others.find(|other| FileIdentity::of(other.path).as_ref() == Some(at))
         };
         match conflict(plan, target, real, &inputs, twin) {
-            Some(conflict) => Err(OutputError::Refused { reason: in_a_line(&conflict) }),
+            Some(conflict) => Err(OutputError::Refused { reason: one_line(&conflict) }),
             None => Ok(()),
         }
     };
@@ -112,109 +113,111 @@ pub(super) fn guarded<'a, T>(
     })
 }
 
-/// For messages that have no room for more.
-fn in_a_line(conflict: &Diagnostic) -> String {
+/// Formats a conflict for one-line messages.
+fn one_line(conflict: &Diagnostic) -> String {
     let help = conflict.help.as_ref().map_or(String::new(), |help| format!("; {help}"));
     format!("{}{help}", conflict.message)
 }
 
-/// Everything that this call writes: what the request writes, then the pictures of a turntable that are still to come.
-fn targets(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
-    let picture = |path| Target::picture(plan, path);
-    targets_now(plan).chain(plan.to_come.iter().map(PathBuf::as_path).map(picture))
+/// Returns the files of this request, then the files of later turntable frames.
+fn targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
+    let picture = |path| OutputTarget::picture(plan, path);
+    targets_now(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
 }
 
-/// The pictures, then the report.
-fn targets_now(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
-    let picture = |path| Target::picture(plan, path);
-    let report = plan.report.iter().map(|path| Target::report(path));
+/// Returns the images and then the report.
+fn targets_now(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
+    let picture = |path| OutputTarget::picture(plan, path);
+    let report = plan.report.iter().map(|path| OutputTarget::report(path));
     let pictures = plan.outputs.iter().chain(&plan.moving);
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
-/// Why this target, which leads to `at`, must not be written; `twin` finds another target of the same file.
+/// Returns why a target that leads to `at` must not be written. `twin` finds another target with the same file.
 fn conflict<'a>(
     plan: &'a Plan,
-    target: Target<'a>,
+    target: OutputTarget<'a>,
     at: &Path,
     inputs: &OnDisk<'_>,
-    twin: impl Fn(Target<'a>, &FileIdentity) -> Option<Target<'a>>,
+    twin: impl Fn(OutputTarget<'a>, &FileIdentity) -> Option<OutputTarget<'a>>,
 ) -> Option<Diagnostic> {
     if let Some(identity) = FileIdentity::of(at) {
         if let Some(input) = inputs.find(at) {
-            return Some(is_input(plan, target, input));
+            return Some(input_error(plan, target, input));
         }
         if let Some(twin) = twin(target, &identity) {
-            return Some(is_twin(plan, target, twin.path));
+            return Some(same_file_error(plan, target, twin.path));
         }
         if let Some(output) = plan.outputs.first().filter(|output| has_checkpoint_at(output, &identity)) {
             let (name, output) = (target.path.display(), output.display());
             let message = format!("cannot write {name}: it is the checkpoint of {output}");
-            return Some(of_call(message, Some(way_out(plan, target.kind).to_owned())));
+            return Some(call_error(message, Some(remedy(plan, target.kind).to_owned())));
         }
     }
-    if plan.replaces_foreign { None } else { is_foreign(plan, target, at) }
+    if plan.replaces_foreign { None } else { foreign_file_error(plan, target, at) }
 }
 
-/// Whether the checkpoint of an output is written to this file.
+/// Whether the checkpoint of an output is this file.
 fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
     FileIdentity::of(&checkpoint_of(output)).as_ref() == Some(identity)
 }
 
-fn is_input(plan: &Plan, target: Target<'_>, input: &Input) -> Diagnostic {
+fn input_error(plan: &Plan, target: OutputTarget<'_>, input: &Input) -> Diagnostic {
     let is_same_name = target.path == input.path;
     let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
     let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
-    let help = Some(way_out(plan, target.kind).to_owned());
+    let help = Some(remedy(plan, target.kind).to_owned());
     match &input.place {
         Some((loaded, span)) => loaded.diagnostic_at(span.clone(), Severity::Error, message, help),
-        None => of_call(message, help),
+        None => call_error(message, help),
     }
 }
 
-fn is_twin(plan: &Plan, target: Target<'_>, twin: &Path) -> Diagnostic {
+fn same_file_error(plan: &Plan, target: OutputTarget<'_>, twin: &Path) -> Diagnostic {
     let (name, twin) = (target.path.display(), twin.display());
     let message = match target.kind {
-        Kind::Picture(_) => format!("the outputs {twin} and {name} are one file"),
-        Kind::Report => format!("the picture {twin} and the report {name} are one file"),
+        TargetKind::Picture(_) => format!("the outputs {twin} and {name} {SAME_FILE}"),
+        TargetKind::Report => format!("the image {twin} and the report {name} {SAME_FILE}"),
     };
-    of_call(message, Some(format!("each needs a file of its own: {}", way_out(plan, target.kind))))
+    call_error(message, Some(format!("use separate files: {}", remedy(plan, target.kind))))
 }
 
-/// A file that exists already and that glimt did not write.
-fn is_foreign(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> {
-    let (name, way_out) = (target.path.display(), way_out(plan, target.kind));
+/// Returns an error if an existing file was not written by glimt.
+fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
+    let (name, remedy) = (target.path.display(), remedy(plan, target.kind));
     let (replaced, help) = match target.kind {
-        Kind::Picture(NamedBy::Nobody) => {
-            let own = match &plan.usual_names {
+        TargetKind::Picture(NamedBy::Default) => {
+            let own = match &plan.default_names {
                 Some(names) => format!("'{}'", names.display()),
                 None => name.to_string(),
             };
-            let help = format!("{way_out}; -o {own} or --force replaces it");
+            let help = format!("{remedy}; -o {own} or --force replaces it");
             let replaced = replaced_picture(at);
             if let (Replaced::Own, Some(other)) = (&replaced, other_scene(plan, at)) {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
-                return Some(of_call(message, Some(help)));
+                return Some(call_error(message, Some(help)));
             }
             (replaced, help)
         }
-        Kind::Report => {
-            let replaced = replaced_json(at, "a report", Marks::have_all_stages);
-            (replaced, format!("{way_out}; --force replaces it"))
+        TargetKind::Report => {
+            let replaced = replaced_json(at, "a report", ReportMarks::have_all_stages);
+            (replaced, format!("{remedy}; --force replaces it"))
         }
-        Kind::Picture(NamedBy::Call | NamedBy::Scene) => return is_other_part(plan, target, at),
+        TargetKind::Picture(NamedBy::CommandLine | NamedBy::Scene) => {
+            return other_part_error(plan, target, at);
+        }
     };
-    Some(of_call(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))
+    Some(call_error(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))
 }
 
-/// The scene of a picture that glimt wrote, unless it is this one.
+/// Returns the scene of an image that glimt wrote, unless it is this scene.
 fn other_scene(plan: &Plan, at: &Path) -> Option<String> {
     scene_of_picture(at).filter(|named| !scene_path::is_same(named, &plan.path, at))
 }
 
-/// A checkpoint, or another part of as many: hours of work that look like an output. Parts of another number are those of a
-/// render before.
-fn is_other_part(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> {
+/// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours of work.
+/// Parts of a different total are of an earlier render and may be replaced.
+fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<Diagnostic> {
     if !part::is_part(at) {
         return None;
     }
@@ -228,21 +231,23 @@ fn is_other_part(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnosti
         None => "a part or a checkpoint of another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());
-    Some(of_call(message, Some(format!("{}; --force replaces it", way_out(plan, target.kind)))))
+    Some(call_error(message, Some(format!("{}; --force replaces it", remedy(plan, target.kind)))))
 }
 
-fn way_out(plan: &Plan, kind: Kind) -> &'static str {
+fn remedy(plan: &Plan, kind: TargetKind) -> &'static str {
     match kind {
-        Kind::Picture(NamedBy::Nobody) if plan.turn.is_some() => "name others with -o 'NAME_####.png'",
-        Kind::Picture(NamedBy::Nobody) if is_mesh(Path::new(&plan.name)) => "name a file with -o FILE",
-        Kind::Picture(NamedBy::Call) => "name another file with -o FILE",
-        Kind::Picture(NamedBy::Scene) => "name another file with -o FILE, or as `output` in [render]",
-        Kind::Picture(NamedBy::Nobody) => "name a file with -o FILE, or with `output = \"FILE\"` in [render]",
-        Kind::Report => "name another file with --report FILE.json",
+        TargetKind::Picture(NamedBy::Default) if plan.turn.is_some() => "name others with -o 'NAME_####.png'",
+        TargetKind::Picture(NamedBy::Default) if is_mesh(Path::new(&plan.name)) => "name a file with -o FILE",
+        TargetKind::Picture(NamedBy::CommandLine) => "name another file with -o FILE",
+        TargetKind::Picture(NamedBy::Scene) => "name another file with -o FILE, or as `output` in [render]",
+        TargetKind::Picture(NamedBy::Default) => {
+            "name a file with -o FILE, or with `output = \"FILE\"` in [render]"
+        }
+        TargetKind::Report => "name another file with --report FILE.json",
     }
 }
 
-/// A diagnostic about the call, which has no place in the scene.
-fn of_call(message: String, help: Option<String>) -> Diagnostic {
+/// Creates a diagnostic about the command line, which has no location in the scene.
+fn call_error(message: String, help: Option<String>) -> Diagnostic {
     Diagnostic { severity: Severity::Error, message, path: PathBuf::new(), place: None, help }
 }

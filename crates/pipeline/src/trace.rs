@@ -1,4 +1,5 @@
-//! Tiles on a pool: claimed one by one in the order given, kept by the thread that made them, told to the thread that asked.
+//! Renders tiles on a thread pool. Threads claim jobs in order, store the samples themselves and report to the calling
+//! thread.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -13,7 +14,7 @@ use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
 
-/// The function that renders a tile, with photon maps or without: see [`crate::integrators::render_tile_with_photons`].
+/// Renders a tile, with or without photon maps: see [`crate::integrators::render_tile_with_photons`].
 pub(super) type Kernel = fn(
     Option<&PhotonMaps>,
     &World,
@@ -23,14 +24,13 @@ pub(super) type Kernel = fn(
     &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled>;
 
-/// The longest time without a tick.
+/// Maximum time between two calls of the callback.
 pub(super) const TICK: Duration = Duration::from_millis(20);
 
-/// Results wait until so much time has passed since the last ones were sent, or the job after them is done: to wake the thread that
-/// asked takes longer than the smallest jobs.
+/// Minimum time between two reports of a thread: waking the calling thread takes longer than the smallest jobs.
 const AT_ONCE: Duration = Duration::from_micros(300);
 
-/// Everything that is the same for all tiles.
+/// State shared by all jobs.
 #[derive(Clone, Copy)]
 pub(super) struct Tracer<'a> {
     pub(super) kernel: Kernel,
@@ -38,13 +38,13 @@ pub(super) struct Tracer<'a> {
     pub(super) world: &'a World,
     pub(super) settings: &'a RenderSettings,
     pub(super) token: &'a CancelToken,
-    /// Photon maps of all jobs' samples, if photons are gathered.
+    /// Photon maps for the samples of all jobs, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
-    /// Number in the whole picture of sample 0 of the jobs.
+    /// Index in the whole image of the jobs' sample 0.
     pub(super) first: u32,
 }
 
-/// Samples of one tile that are to be made.
+/// Samples of one tile to render.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Job {
     pub(super) tile: usize,
@@ -56,7 +56,7 @@ pub(super) struct Job {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cost {
     pub(super) rays: RayCounters,
-    /// Processor seconds; the picture does not depend on them.
+    /// CPU seconds. They do not influence the image.
     pub(super) seconds: f64,
 }
 
@@ -76,9 +76,9 @@ impl Tracer<'_> {
         Ok((samples, Cost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 
-    /// Do the jobs. `keep` takes the samples of every job that is finished on the thread that made them, in whose cache
-    /// they are; `each` is then told on this one, in the order in which they end, and every now and then nothing; it says whether
-    /// to go on. Jobs that have begun are finished.
+    /// Renders the jobs. `keep` stores the samples of each finished job, on the thread that rendered it and has them in
+    /// its cache. `each` is called on this thread for finished jobs, in the order in which they end, and with `None` at
+    /// least once per [`TICK`]; it returns whether to continue. Jobs that have begun are finished.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -90,7 +90,7 @@ impl Tracer<'_> {
     ) -> Result<(), Cancelled> {
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let threads = self.pool.current_num_threads();
-        // Bounded, so that results do not pile up while a preview is made.
+        // Bound the channel so that results do not pile up while a preview is made.
         let (sender, results) = mpsc::sync_channel(2 * threads);
         let (next, stopped, keep) = (&next, &stopped, &keep);
         self.pool.in_place_scope(move |scope| {
@@ -111,7 +111,7 @@ impl Tracer<'_> {
                             since = Instant::now();
                         }
                     }
-                    // Nobody listens any more where this fails.
+                    // The send fails only if the receiver is gone.
                     let _ = sender.send(done);
                 });
             }
@@ -130,12 +130,12 @@ impl Tracer<'_> {
                 stopped.fetch_or(!go_on, Ordering::Relaxed);
             }
         });
-        // Not `check`, which would wait here while the work is held, deaf to orders.
+        // Do not call `check`, which blocks while work is paused and would delay orders.
         if self.token.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 }
 
-/// Dropped by a panic, it stops the others: their work would be thrown away.
+/// Stops the other threads on a panic, which discards their work anyway.
 struct StopOnPanic<'a>(&'a AtomicBool);
 
 impl Drop for StopOnPanic<'_> {
@@ -146,8 +146,8 @@ impl Drop for StopOnPanic<'_> {
     }
 }
 
-/// Samples that every pixel has after the next pass: 1, 2, 4, … so that pictures come early, then in steps that
-/// keep a tile short, in a picture of so many pixels. Every power of two is the end of a pass, as noise is judged there.
+/// Returns the samples per pixel after the next pass: 1, 2, 4, … for early images, then in steps that keep the time per
+/// tile short. `pixels` is the size of the image. Every power of two ends a pass, because noise is judged there.
 pub(super) fn next_pass(done: u32, total: u32, pixels: usize) -> u32 {
     let longest = longest_pass(pixels);
     let power = done.saturating_add(1).checked_next_power_of_two().unwrap_or(u32::MAX);
@@ -161,8 +161,9 @@ fn longest_pass(pixels: usize) -> u32 {
     (LONGEST * (TILE / pixels.clamp(1, TILE))) as u32
 }
 
-/// In about how many jobs pixels get from `done` samples to `total` by [`next_pass`], where no job has more than `at_once`.
-pub(super) fn jobs_to_come(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
+/// Estimates the number of jobs of at most `at_once` samples in which [`next_pass`] gets a pixel from `done` to `total`
+/// samples.
+pub(super) fn remaining_jobs(done: u32, total: u32, pixels: usize, at_once: u32) -> u32 {
     let longest = longest_pass(pixels);
     let (mut reached, mut jobs) = (done, 0);
     while reached < longest.min(total) {
@@ -178,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn jobs_to_come_are_those_of_the_passes() {
+    fn remaining_jobs_match_the_passes() {
         for (done, total, pixels, at_once) in [
             (0, 1, 5000, 99),
             (0, 100, 5000, 99),
@@ -193,13 +194,17 @@ mod tests {
                 jobs += (end - reached).div_ceil(at_once);
                 reached = end;
             }
-            assert_eq!(jobs_to_come(done, total, pixels, at_once), jobs, "{done} {total} {pixels} {at_once}");
+            assert_eq!(
+                remaining_jobs(done, total, pixels, at_once),
+                jobs,
+                "{done} {total} {pixels} {at_once}"
+            );
         }
-        assert_eq!(jobs_to_come(0, u32::MAX, 5000, u32::MAX), 6 + (u32::MAX - 32).div_ceil(32));
+        assert_eq!(remaining_jobs(0, u32::MAX, 5000, u32::MAX), 6 + (u32::MAX - 32).div_ceil(32));
     }
 
     #[test]
-    fn passes_double_and_then_stay_short() {
+    fn passes_double_then_stay_short() {
         let passes = |total, pixels| {
             let mut ends = vec![0];
             while let Some(&last) = ends.last()
@@ -211,7 +216,7 @@ mod tests {
         };
         assert_eq!(passes(1, 5000), [0, 1]);
         assert_eq!(passes(100, 5000), [0, 1, 2, 4, 8, 16, 32, 64, 96, 100]);
-        // A picture of half a tile takes twice as many at a time.
+        // An image of half a tile takes twice as many samples per pass.
         assert_eq!(passes(200, 512), [0, 1, 2, 4, 8, 16, 32, 64, 128, 192, 200]);
         assert_eq!(next_pass(100, 1000, 5000), 128);
         assert_eq!(next_pass(u32::MAX - 1, u32::MAX, 0), u32::MAX);

@@ -1,4 +1,4 @@
-//! Turntables: pictures all around `look_at`, as files with numbers or as one moving picture.
+//! Turntables: frames around `look_at`, as numbered files or as an animation.
 
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -11,29 +11,29 @@ use crate::math::transform::sin_cos_degrees;
 use crate::output::MovingFormat;
 use crate::scene::description::Pose;
 
-/// Most pictures of a turn.
+/// Maximum number of frames.
 pub const MOST: u32 = 10_000;
 
-/// The sign in a file's name that stands for a digit.
+/// Placeholder of a digit in a file name.
 const DIGIT: u8 = b'#';
 
-/// One picture of a turn.
+/// One frame of a turntable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Turn {
-    /// Its number, from 0.
+    /// Index of the frame, from 0.
     pub number: u32,
-    /// Pictures of the turn, at least 1.
+    /// Number of frames, at least 1.
     pub of: u32,
 }
 
 impl Turn {
-    /// Whether it is the last one.
+    /// Whether this is the last frame.
     pub fn is_last(self) -> bool {
         self.number + 1 == self.of
     }
 
-    /// The camera of this picture: that of the first one, moved about the axis `up` through `look_at`, counterclockwise seen from
-    /// above.
+    /// Returns the camera of this frame: the first camera rotated about the axis `up` through `look_at`,
+    /// counterclockwise as seen from above.
     pub(super) fn pose(self, first: &Pose) -> Pose {
         if self.number == 0 {
             return *first;
@@ -46,17 +46,17 @@ impl Turn {
         Pose { position: first.look_at + turned, ..*first }
     }
 
-    /// The arms from `look_at` to the eye in all pictures of a turn, and what is up there.
+    /// Returns the vectors from `look_at` to the camera for all frames.
     pub(super) fn arms(of: u32, arm: DVec3, up: DVec3) -> impl Iterator<Item = DVec3> {
         let first = Pose { position: arm, look_at: DVec3::ZERO, up };
         (0..of.max(1)).map(move |number| Self { number, of: of.max(1) }.pose(&first).position)
     }
 }
 
-/// Whether a file can hold the pictures of a turn.
+/// Checks that an output can hold all frames.
 ///
 /// # Errors
-/// The reason why it cannot, with the way out.
+/// A message with a suggestion.
 pub fn check_name(path: &Path) -> Result<(), String> {
     if MovingFormat::of(path).is_some() || numbers(path).is_some() {
         return Ok(());
@@ -65,16 +65,16 @@ pub fn check_name(path: &Path) -> Result<(), String> {
     let example = suggested(path);
     let example = example.display();
     Err(format!(
-        "{name} would hold one picture of the turntable: write {example} for a file each, or a .gif or .apng file"
+        "{name} can hold only one frame of the turntable; use {example} for numbered files, or a .gif or .apng file"
     ))
 }
 
-/// Whether a file's name has a place for the number of a picture.
+/// Whether a file name has a placeholder for the frame number.
 pub fn has_number(path: &Path) -> bool {
     numbers(path).is_some()
 }
 
-/// The name that a file of a single picture gets in a turntable: `a.png` becomes `a_####.png`.
+/// Returns the numbered file name for a still image's: `a.png` becomes `a_####.png`.
 pub fn suggested(path: &Path) -> PathBuf {
     let mut name = path.file_stem().unwrap_or_default().to_owned();
     name.push("_####");
@@ -85,30 +85,31 @@ pub fn suggested(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// The file of a picture: the name with the picture's number, from 1, in place of its last run of `#`. `None` if it has none.
+/// Returns the file of a frame, with its number, from 1, in place of the last run of `#`. Returns `None` if there is
+/// none.
 pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
     let (before, digits, after) = numbers(path)?;
     Some(path.with_file_name(with_number(before, (turn.number + 1, digits), after)))
 }
 
-/// A name with a number of at least so many digits in it. Formats take no widths above 65,535.
+/// Inserts a number with at least this many digits. Format strings do not support widths above 65,535.
 fn with_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> OsString {
     let number = number.to_string();
     let zeros = vec![b'0'; digits.saturating_sub(number.len())];
     OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
 }
 
-/// The first file that would hold two pictures of a turntable of so many. `None` if each has a file of its own.
+/// Returns the first file that would hold two frames. `None` if all frames have separate files.
 pub fn twin(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     let mut seen = HashSet::new();
     let all = |number| outputs.iter().filter_map(move |path| numbered(path, Turn { number, of }));
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
-/// Files that have the next numbers behind the last picture of a turntable: those of a longer one before.
+/// Returns existing files numbered after the last frame, which are left over from a longer turntable.
 pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
     let name = last.file_name().unwrap_or_default().as_bytes();
-    // Find the picture's number: the last run of digits that is it.
+    // Find the frame number: the last run of digits with its value.
     let ends_run = |at: usize| at + 1 == name.len() || !name[at + 1].is_ascii_digit();
     let is_end = |at: &usize| name[*at].is_ascii_digit() && ends_run(*at);
     let run = |end: usize| name[..end].iter().rposition(|byte| !byte.is_ascii_digit()).map_or(0, |at| at + 1);
@@ -122,7 +123,7 @@ pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
     (turn.number + 2..=MOST).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
 }
 
-/// Bytes before the last run of `#` in a file's name, the length of the run, and the bytes behind it.
+/// Splits a file name into the bytes before its last run of `#`, the length of the run, and the bytes after it.
 fn numbers(path: &Path) -> Option<(&[u8], usize, &[u8])> {
     let name = path.file_name()?.as_bytes();
     let end = name.iter().rposition(|byte| *byte == DIGIT)? + 1;
@@ -135,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_of_a_longer_turntable_are_found() {
+    fn left_over_frames_are_found() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
         for name in ["w_3.png", "a2_003.png", "a2_004.png", "a2_006.png", "v1_2_2.png", "v1_3_2.png"] {
@@ -152,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn the_camera_goes_all_around_and_keeps_its_distance() {
+    fn camera_orbits_at_constant_distance() {
         let first = Pose {
             position: DVec3::new(1.0, 3.0, 4.0),
             look_at: DVec3::new(1.0, 1.0, 0.0),
@@ -168,12 +169,12 @@ mod tests {
     }
 
     #[test]
-    fn files_have_the_number_of_their_picture() {
+    fn files_are_numbered_by_frame() {
         let name = |path: &str, number| numbered(Path::new(path), Turn { number, of: 100 });
         assert_eq!(name("out/a_####.png", 6), Some("out/a_0007.png".into()));
-        assert_eq!(name("a#.exr", 99), Some("a100.exr".into()), "it grows where it must");
+        assert_eq!(name("a#.exr", 99), Some("a100.exr".into()), "numbers may be longer");
         assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
-        assert_eq!(name("##/a.png", 0), None, "folders are not counted");
+        assert_eq!(name("##/a.png", 0), None, "folders are ignored");
         assert_eq!(name("##a##_###", 4), Some("##a##_005".into()));
         let endless = numbered(Path::new(&"#".repeat(65_536)), Turn { number: 6, of: 9 }).expect("a name");
         let endless = endless.into_os_string().into_string().expect("digits");
@@ -186,19 +187,19 @@ mod tests {
     }
 
     #[test]
-    fn names_that_meet_are_found() {
+    fn colliding_names_are_found() {
         let twin = |names: [&str; 2], of| twin(&names.map(PathBuf::from), of);
         assert_eq!(twin(["a_#.png", "a_1#.png"], 10), None);
         assert_eq!(twin(["a_#.png", "a_1#.png"], 11), Some("a_11.png".into()));
         assert_eq!(twin(["a_#.png", "a_##.png"], 9), None);
         assert_eq!(twin(["a_#.png", "a_##.png"], 10), Some("a_10.png".into()));
-        assert_eq!(twin(["a.gif", "a.apng"], 100), None, "these have no numbers");
+        assert_eq!(twin(["a.gif", "a.apng"], 100), None, "animations have no numbers");
     }
 
     #[test]
-    fn a_file_of_one_picture_is_refused_with_the_way_out() {
-        let said = check_name(Path::new("x/a.png")).expect_err("one file");
-        assert!(said.contains("write x/a_####.png for a file each, or a .gif or .apng file"), "{said}");
+    fn still_image_file_is_rejected_with_advice() {
+        let message = check_name(Path::new("x/a.png")).expect_err("one file");
+        assert!(message.contains("x/a_####.png"), "{message}");
         for right in ["a_####.png", "a.gif", "a.APNG", "a#.exr"] {
             assert_eq!(check_name(Path::new(right)), Ok(()), "{right}");
         }

@@ -1,18 +1,18 @@
-//! Amounts in words, the same in every front end.
+//! Formatting of durations and sample counts, shared by all front ends.
 
 use super::protocol::RenderProgress;
 
-/// Time until the end of a render, as far as it is worth showing.
+/// Remaining time of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Eta {
-    /// In this many seconds.
+    /// Remaining seconds.
     Seconds(f64),
-    /// After more than a day.
+    /// More than a day.
     OverADay,
 }
 
 impl Eta {
-    /// `None` while an estimate is mostly noise: before 1 % of the render is done, and in its first half second.
+    /// Returns `None` while an estimate is mostly noise: below 1 % of the render or during its first half second.
     pub fn of(progress: &RenderProgress) -> Option<Self> {
         const DAY: f64 = 24.0 * 3600.0;
         let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;
@@ -20,7 +20,7 @@ impl Eta {
         Some(if seconds > DAY { Self::OverADay } else { Self::Seconds(seconds) })
     }
 
-    /// The time in words, for a line that is not redrawn often.
+    /// Formats the time for a line that is rarely redrawn.
     pub fn words(self) -> String {
         match self {
             Self::Seconds(time) => seconds(time),
@@ -29,16 +29,17 @@ impl Eta {
     }
 }
 
-/// Average samples per pixel so far, rounded down. Has tenths where a whole number would contradict the percentage beside it.
+/// Formats the average samples per pixel, rounded down. Uses tenths where an integer would contradict the displayed
+/// percentage.
 pub fn samples_so_far(progress: &RenderProgress) -> String {
-    /// From this total on, a sample is less than a percent.
+    /// For totals from here on, one sample is at most one percent.
     const FINE: u32 = 100;
     let tenths = (progress.mean_samples * 10.0).floor();
     let has_tenths = progress.total_samples < FINE && tenths % 10.0 != 0.0;
     if has_tenths { format!("{:.1}", tenths / 10.0) } else { format!("{:.0}", progress.mean_samples.floor()) }
 }
 
-/// A time in a few characters.
+/// Formats a time in a few characters.
 pub fn seconds(seconds: f64) -> String {
     match seconds {
         s if !s.is_finite() || s < 0.0 => "?".to_owned(),
@@ -78,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn an_eta_is_neither_early_nor_absurd() {
+    fn eta_is_neither_early_nor_absurd() {
         let eta = |fraction, elapsed, eta| Eta::of(&progress(fraction, elapsed, Some(eta))).map(Eta::words);
         assert_eq!(eta(0.009, 60.0, 6e3), None);
         assert_eq!(eta(0.4, 0.49, 0.7), None);
@@ -109,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn times_in_words() {
+    fn times_are_short() {
         for (time, words) in [
             (0.0, "0.00 ms"),
             (0.000_001, "<0.01 ms"),

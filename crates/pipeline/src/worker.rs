@@ -1,7 +1,7 @@
-//! The thread that owns the engine, and the handle that front ends hold.
+//! The worker thread, which owns the engine, and its handle for front ends.
 //!
-//! The mailbox holds one request: a newer one replaces it and cancels the one under way. Token and mailbox change
-//! under one lock, so that no cancel is lost between two requests.
+//! The mailbox holds one request: a newer one replaces it and cancels the current one. Token and mailbox change under
+//! one lock, so that no cancellation is lost between two requests.
 
 use std::any::Any;
 use std::collections::VecDeque;
@@ -11,41 +11,41 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::engine::{Engine, Interruption, Means, Meanwhile, Orders};
-use super::errands::Errand;
+use super::engine::{Engine, EngineConfig, Interruption, Orders, RequestContext};
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
+use super::queries::Query;
 use super::settings::Overrides;
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
 
-/// Starts a worker with its thread. On Linux the nice value of its render threads is `nice` above that of this thread, so that
-/// the front end and everything else on the machine can go first.
+/// Starts a worker thread. On Linux the niceness of its render threads is `nice` above this thread's, so that the front
+/// end and other programs take precedence.
 ///
 /// # Errors
-/// The system has no thread left.
+/// The system cannot start a thread.
 pub fn start(nice: u8) -> std::io::Result<Handle> {
-    start_with(Means { nice, ..Means::default() })
+    start_with(EngineConfig { nice, ..EngineConfig::default() })
 }
 
-/// A worker with other means.
-pub(super) fn start_with(means: Means) -> std::io::Result<Handle> {
+/// Starts a worker with this configuration.
+pub(super) fn start_with(config: EngineConfig) -> std::io::Result<Handle> {
     let (sender, events) = mpsc::channel();
     let remote = Remote { mailbox: Arc::default(), events: sender };
     let previews = PreviewSlot::default();
     let contents = Arc::<Contents>::default();
     let worker =
-        Worker { remote: remote.clone(), previews: previews.clone(), means, contents: contents.clone() };
+        Worker { remote: remote.clone(), previews: previews.clone(), config, contents: contents.clone() };
     let thread = std::thread::Builder::new().name("glimt-worker".to_owned()).spawn(move || worker.work())?;
     Ok(Handle { events, previews, remote, contents, thread: Some(thread) })
 }
 
-/// A running worker. Dropping it ends the worker, which may take as long as a file takes to be written.
+/// A running worker. Dropping it stops the worker, which may take as long as writing a file.
 #[derive(Debug)]
 pub struct Handle {
     /// Events of the worker.
     pub events: Receiver<Event>,
-    /// Slot for preview pictures.
+    /// Slot for previews.
     pub previews: PreviewSlot,
     remote: Remote,
     contents: Arc<Contents>,
@@ -53,22 +53,23 @@ pub struct Handle {
 }
 
 impl Handle {
-    /// Give an order; never blocks.
+    /// Sends a command without blocking.
     pub fn send(&self, command: Command) {
         self.remote.send(command);
     }
 
-    /// A way to give orders from elsewhere.
+    /// Returns a handle for sending commands from other threads.
     pub fn remote(&self) -> Remote {
         self.remote.clone()
     }
 
-    /// The worker's knowledge of files, for a watcher of the same files.
+    /// Returns the worker's file contents, for a watcher of the same files.
     pub fn contents(&self) -> Arc<Contents> {
         Arc::clone(&self.contents)
     }
 
-    /// Tell the worker to end and wait for it at most this long; true: it has ended. A picture that is being written is written.
+    /// Stops the worker and waits for at most `patience`. Returns whether it has stopped. An image that is being
+    /// written is completed.
     pub fn end_within(&self, patience: Duration) -> bool {
         self.send(Command::Quit);
         let deadline = Instant::now().checked_add(patience);
@@ -78,7 +79,7 @@ impl Handle {
         self.has_ended()
     }
 
-    /// The same for the last time: a worker that does not end is left to the end of the process.
+    /// Like [`Self::end_within`], but abandons a worker that does not stop.
     pub fn finish(mut self, patience: Duration) -> bool {
         let has_ended = self.end_within(patience);
         if !has_ended {
@@ -96,13 +97,13 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.send(Command::Quit);
         if let Some(thread) = self.thread.take() {
-            // An event has reported a panic of the thread.
+            // A panic of the thread has been reported as an event.
             let _ = thread.join();
         }
     }
 }
 
-/// Gives orders to a worker.
+/// Sends commands to a worker.
 #[derive(Clone, Debug)]
 pub struct Remote {
     mailbox: Arc<(Mutex<Mailbox>, Condvar)>,
@@ -113,30 +114,30 @@ pub struct Remote {
 struct Mailbox {
     request: Option<Box<Request>>,
     write: bool,
-    /// The order to write came too early: it is for the request that waits.
+    /// The write order came too early and is meant for the pending request.
     is_write_postponed: bool,
-    /// The order to write came when the request that waits was there: it is meant.
+    /// The write order came after the pending request and is meant for it.
     is_write_of_waiting: bool,
-    /// Settings of the request under way that keys change.
+    /// Settings of the current request that keys change.
     shown: Overrides,
-    /// Another size of the previews.
+    /// New size of previews.
     preview: Option<Option<PreviewSize>>,
-    errands: VecDeque<Errand>,
-    /// Whether the newest request is held.
+    queries: VecDeque<Query>,
+    /// Whether the newest request is paused.
     paused: bool,
-    /// Whether the render under way is stopped to be gone on with later.
+    /// Whether the current render is stopped to be resumed later.
     suspended: bool,
     quit: bool,
-    /// Token of the request under way.
+    /// Token of the current request.
     token: CancelToken,
-    /// Token of the write stage: a whole picture is not lost to a pause, to the end of the program or to a request that writes
-    /// nothing.
+    /// Token of the write stage: a pause, the end of the program or a request without output must not interrupt the
+    /// writing of a finished image.
     writing: CancelToken,
     /// Generation of the newest request.
     newest: u64,
 }
 
-/// Settings of a request that keys change.
+/// Returns the settings of a request that keys change.
 fn shown(request: &Request) -> Overrides {
     let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
     Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
@@ -144,16 +145,16 @@ fn shown(request: &Request) -> Overrides {
 
 /// Next task of the worker.
 enum Task {
-    /// With the tokens of the work and of the writing at its end.
+    /// A request, with the tokens of the render and of the write stage.
     Render(Box<Request>, CancelToken, CancelToken),
     Write,
     Preview(Option<PreviewSize>, CancelToken),
-    Errand(Errand),
+    Query(Query),
     Quit,
 }
 
 impl Remote {
-    /// Give an order; never blocks.
+    /// Sends a command without blocking.
     pub fn send(&self, command: Command) {
         let mut mailbox = self.lock();
         match command {
@@ -163,11 +164,11 @@ impl Remote {
                 mailbox.is_write_of_waiting = mailbox.request.is_some();
             }
             Command::Preview(size) => mailbox.preview = Some(size),
-            Command::KeepCamera(camera) => mailbox.errands.push_back(Errand::KeepCamera(camera)),
-            Command::UndoCamera(edit) => mailbox.errands.push_back(Errand::UndoCamera(edit)),
-            Command::Pick(spot) => {
-                mailbox.errands.retain(|errand| !matches!(errand, Errand::Pick(_)));
-                mailbox.errands.push_back(Errand::Pick(spot));
+            Command::KeepCamera(camera) => mailbox.queries.push_back(Query::KeepCamera(camera)),
+            Command::UndoCamera(edit) => mailbox.queries.push_back(Query::UndoCamera(edit)),
+            Command::Pick(position) => {
+                mailbox.queries.retain(|query| !matches!(query, Query::Pick(_)));
+                mailbox.queries.push_back(Query::Pick(position));
             }
             Command::Cancel => {
                 mailbox.token.cancel();
@@ -195,7 +196,7 @@ impl Remote {
         self.mailbox.1.notify_all();
     }
 
-    /// The newest request wins, whatever the order in which they come.
+    /// Replaces the pending request unless it is newer. Requests may arrive in any order.
     fn replace(&self, mailbox: &mut Mailbox, request: Box<Request>) {
         if request.generation < mailbox.newest {
             return self.say_cancelled(Some(request));
@@ -212,7 +213,7 @@ impl Remote {
 
     fn say_cancelled(&self, request: Option<Box<Request>>) {
         if let Some(request) = request {
-            // A front end that is gone needs no events.
+            // Ignore a front end that has gone.
             let _ = self.events.send(Event::Cancelled { generation: request.generation });
         }
     }
@@ -221,13 +222,15 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keeps an order to write for the waiting request, if it is meant, or if it has the settings of the current picture and that
-    /// has holes. Returns whether the order is kept.
+    /// Keeps a write order for the pending request, if it was meant for it, or if it has the settings of the current
+    /// image and that is incomplete. Returns whether the order is kept.
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
-        let postponed =
-            mailbox.request.as_ref().is_some_and(|one| is_meant || !can_write && shown(one) == mailbox.shown);
+        let postponed = mailbox
+            .request
+            .as_ref()
+            .is_some_and(|request| is_meant || !can_write && shown(request) == mailbox.shown);
         (mailbox.write, mailbox.is_write_postponed) = (postponed, postponed);
         postponed
     }
@@ -235,7 +238,7 @@ impl Remote {
     fn next(&self) -> Task {
         let mut mailbox = self.lock();
         loop {
-            // An order to write that came before the end is carried out.
+            // Carry out a write order that came before the end.
             if mailbox.write && !(mailbox.is_write_postponed && mailbox.request.is_some()) {
                 mailbox.write = false;
                 return Task::Write;
@@ -243,8 +246,8 @@ impl Remote {
             if mailbox.quit {
                 return Task::Quit;
             }
-            if let Some(errand) = mailbox.errands.pop_front() {
-                return Task::Errand(errand);
+            if let Some(query) = mailbox.queries.pop_front() {
+                return Task::Query(query);
             }
             mailbox.is_write_postponed = false;
             if let Some(request) = mailbox.request.take() {
@@ -280,8 +283,8 @@ impl Orders for Remote {
         self.lock().preview.take()
     }
 
-    fn take_errand(&self) -> Option<Errand> {
-        self.lock().errands.pop_front()
+    fn take_query(&self) -> Option<Query> {
+        self.lock().queries.pop_front()
     }
 
     fn interruption(&self) -> Interruption {
@@ -298,13 +301,13 @@ struct Worker {
     remote: Remote,
     contents: Arc<Contents>,
     previews: PreviewSlot,
-    means: Means,
+    config: EngineConfig,
 }
 
 impl Worker {
     fn work(self) {
         let _last_words = LastWords(&self.remote);
-        let mut engine = Engine::new(self.means, self.contents.clone());
+        let mut engine = Engine::new(self.config, self.contents.clone());
         let mut sink = Sink {
             generation: 0,
             events: self.remote.events.clone(),
@@ -322,16 +325,16 @@ impl Worker {
                 Task::Preview(size, token) => {
                     catch_unwind(AssertUnwindSafe(|| engine.show_now(size, &sink, &token)))
                 }
-                Task::Errand(errand) => catch_unwind(AssertUnwindSafe(|| engine.errand(&errand, &sink))),
+                Task::Query(query) => catch_unwind(AssertUnwindSafe(|| engine.query(&query, &sink))),
                 Task::Render(request, token, writing) => {
                     sink.generation = request.generation;
-                    let meanwhile = Meanwhile::new(&token, &writing, &self.remote);
-                    catch_unwind(AssertUnwindSafe(|| engine.request(&request, &sink, &meanwhile)))
+                    let context = RequestContext::new(&token, &writing, &self.remote);
+                    catch_unwind(AssertUnwindSafe(|| engine.request(&request, &sink, &context)))
                 }
             };
             if let Err(payload) = outcome {
-                // What was half done when it broke is not to be trusted.
-                engine = Engine::new(self.means, self.contents.clone());
+                // Do not trust the state left by a panic.
+                engine = Engine::new(self.config, self.contents.clone());
                 let failure = Failure::Work(format!("internal error: {}", reason(payload.as_ref())));
                 sink.send(Event::Failed { generation: sink.generation, failure });
             }
@@ -339,15 +342,15 @@ impl Worker {
     }
 }
 
-/// Reports the newest request as failed if the thread itself gives up: its front end waits for an end.
+/// Reports the newest request as failed if the thread itself panics, because the front end waits for its end.
 struct LastWords<'a>(&'a Remote);
 
 impl Drop for LastWords<'_> {
     fn drop(&mut self) {
         if std::thread::panicking() {
             let generation = self.0.lock().newest;
-            let failure = Failure::Work("internal error: the renderer gave up".to_owned());
-            // A front end that is gone needs no events.
+            let failure = Failure::Work("internal error: the worker thread panicked".to_owned());
+            // Ignore a front end that has gone.
             let _ = self.0.events.send(Event::Failed { generation, failure });
         }
     }
@@ -355,7 +358,7 @@ impl Drop for LastWords<'_> {
 
 fn reason(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a part of the renderer gave up")
+    text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("unknown panic")
 }
 
 #[cfg(test)]
@@ -384,13 +387,13 @@ mod tests {
     }
 
     #[test]
-    fn a_worker_that_gives_up_ends_its_request() {
+    fn panicking_worker_ends_its_request() {
         let (events, received) = mpsc::channel();
         let remote = Remote { mailbox: Arc::default(), events };
         remote.send(render(7));
-        let gives_up = remote;
+        let panicking = remote;
         let thread = std::thread::spawn(move || {
-            let _last_words = LastWords(&gives_up);
+            let _last_words = LastWords(&panicking);
             panic!("outside of a request");
         });
         assert!(thread.join().is_err());
@@ -398,12 +401,12 @@ mod tests {
     }
 
     #[test]
-    fn a_hold_is_for_the_newest_request_whether_it_has_begun_or_not() {
+    fn pause_applies_to_the_newest_request() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let ending = token(&remote);
         remote.send(render(2));
-        // The first is still ending when the person presses the key.
+        // The first request is still ending when the user presses the key.
         remote.send(Command::Pause(true));
         assert!(ending.is_cancelled());
         let second = token(&remote);
@@ -412,11 +415,11 @@ mod tests {
         assert!(!second.is_paused());
         remote.send(Command::Pause(true));
         remote.send(render(3));
-        assert!(!token(&remote).is_paused(), "a request that comes later is not held");
+        assert!(!token(&remote).is_paused(), "a later request is not paused");
     }
 
     #[test]
-    fn a_write_that_was_asked_for_before_the_end_is_carried_out() {
+    fn write_before_quit_is_carried_out() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let token = token(&remote);
@@ -425,12 +428,12 @@ mod tests {
         remote.send(Command::Quit);
         assert!(token.is_cancelled());
         assert!(matches!(remote.next(), Task::Write));
-        assert!(!remote.postpone_write(false), "there is no request left that it could wait for");
+        assert!(!remote.postpone_write(false), "no request is pending");
         assert!(matches!(remote.next(), Task::Quit));
     }
 
     #[test]
-    fn the_writing_at_the_end_outlives_a_hold_the_end_and_a_view_but_no_newer_picture() {
+    fn only_a_newer_image_cancels_the_write_stage() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         let begin = |number| {
             remote.send(render(number));
@@ -443,7 +446,7 @@ mod tests {
         remote.send(Command::Pause(true));
         assert!(token.is_paused() && !writing.is_paused());
         remote.send(render(2));
-        assert!(token.is_cancelled() && !writing.is_cancelled(), "the second is for looking at alone");
+        assert!(token.is_cancelled() && !writing.is_cancelled(), "the second request does not write");
         let Command::Render(request) = render(3) else { panic!("a request") };
         remote.send(Command::Render(Box::new(Request { write: Writing::Try, ..*request })));
         assert!(writing.is_cancelled());
@@ -453,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_for_looking_at_is_not_what_was_asked_for_before_it() {
+    fn write_order_is_not_moved_to_another_view() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         let _ = token(&remote);
@@ -462,26 +465,26 @@ mod tests {
         let overrides = Overrides { view: Some(View::Normal), ..view.overrides.clone() };
         remote.send(Command::Render(Box::new(Request { overrides, ..*view })));
         assert!(matches!(remote.next(), Task::Write));
-        assert!(!remote.postpone_write(false), "the first picture is lost, and the person is told");
-        // Asked for when the view waits, it is the view that is meant, also where the first picture has no holes.
+        assert!(!remote.postpone_write(false), "the first image is lost, and an error is reported");
+        // After the view is requested, the order is meant for it, even if the first image is complete.
         remote.send(Command::Write);
-        assert!(!remote.wants_write() && !remote.take_write(), "the request that is ending leaves it alone");
+        assert!(!remote.wants_write() && !remote.take_write(), "the ending request ignores the order");
         assert!(matches!(remote.next(), Task::Write));
         assert!(remote.postpone_write(true));
     }
 
     #[test]
-    fn what_waits_goes_in_its_order() {
+    fn pending_orders_keep_their_order() {
         let remote = Remote { mailbox: Arc::default(), events: mpsc::channel().0 };
         remote.send(render(1));
         remote.send(Command::Write);
         remote.send(Command::Preview(None));
-        assert!(matches!(remote.next(), Task::Write), "the picture that the person sees");
-        assert!(remote.postpone_write(false), "it had holes");
+        assert!(matches!(remote.next(), Task::Write), "the image on the screen");
+        assert!(remote.postpone_write(false), "the image is incomplete");
         assert!(matches!(remote.next(), Task::Render(..)));
-        assert!(remote.take_write(), "the request does it");
+        assert!(remote.take_write(), "the request takes it");
         assert!(!remote.take_write());
         assert!(matches!(remote.next(), Task::Preview(None, _)));
-        assert!(!remote.postpone_write(false), "no request waits that could do it");
+        assert!(!remote.postpone_write(false), "no request is pending");
     }
 }

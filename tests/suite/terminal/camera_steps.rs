@@ -168,6 +168,6 @@ fn camera_is_not_kept_in_a_changed_file() {
     folder.write("scene.toml", &broken);
     terminal.wait_for("broken");
     terminal.press("c");
-    terminal.wait_for("error: the scene file has changed since it was read");
+    terminal.wait_for(glimt::pipeline::messages::SCENE_FILE_CHANGED);
     assert_eq!(fs::read_to_string(folder.path("scene.toml")).expect("a scene"), broken);
 }

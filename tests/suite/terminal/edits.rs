@@ -3,6 +3,7 @@
 use glimt::tui::messages;
 
 use super::pty::{Folder, SCENE, Terminal};
+use glimt::pipeline::protocol::reasons;
 
 /// A triangle next to the board.
 const OBJ: &str = "v 1.2 0 0\nv 1.4 0 0\nv 1.2 0.5 0\nf 1 2 3\n";
@@ -56,10 +57,7 @@ fn edits_rerun_only_dependent_stages() {
     let folder = folder(&own);
     let terminal = terminal(&folder);
     terminal.wait_for_render(1);
-    assert_eq!(
-        stages(&folder, "photons"),
-        ("dddddsdd".to_owned(), "the scene does not enable photons".to_owned())
-    );
+    assert_eq!(stages(&folder, "photons"), ("dddddsdd".to_owned(), reasons::PHOTONS_OFF.to_owned()));
 
     folder.write("scene.toml", &own.replace("[camera]", "# the eye\n\n[camera]"));
     terminal.wait_for(&format!("unchanged · {}", messages::render(1)));
@@ -67,18 +65,12 @@ fn edits_rerun_only_dependent_stages() {
     assert_eq!(stages(&folder, "render").0, "drrrrsrr");
 
     let edits = [
-        ("exposure = 0", "exposure = 1", "drrrrsrd", "render", "nothing that it shows changed"),
-        (
-            "exposure = 0",
-            "exposure = 0\ntonemap = \"agx\"",
-            "drrrrsrd",
-            "render",
-            "nothing that it shows changed",
-        ),
-        ("[0.8, 0.02, 0.02]", "[0.7, 0.02, 0.02]", "drrrrsdd", "accel", "no shape changed"),
-        ("samples = 4", "samples = 4\nbackground = [0, 0, 1]", "drrrrsdd", "lights", "no light changed"),
+        ("exposure = 0", "exposure = 1", "drrrrsrd", "render", reasons::UNCHANGED),
+        ("exposure = 0", "exposure = 0\ntonemap = \"agx\"", "drrrrsrd", "render", reasons::UNCHANGED),
+        ("[0.8, 0.02, 0.02]", "[0.7, 0.02, 0.02]", "drrrrsdd", "accel", reasons::UNCHANGED),
+        ("samples = 4", "samples = 4\nbackground = [0, 0, 1]", "drrrrsdd", "lights", reasons::UNCHANGED),
         ("[20, 20, 20]", "[10, 20, 20]", "drrrdsdd", "lights", "1 light"),
-        ("position = [0, 0, 4]", "position = [0, 0, 5]", "drrrrsdd", "meshes", "the files did not change"),
+        ("position = [0, 0, 4]", "position = [0, 0, 5]", "drrrrsdd", "meshes", reasons::UNCHANGED),
         ("center = [0.5, 0.2", "center = [0.4, 0.2", "drrdrsdd", "accel", "0 mesh trees built, 1 kept"),
         ("one.obj", "two.obj", "ddrdrsdd", "meshes", "1 loaded"),
     ];
@@ -109,7 +101,7 @@ fn edits_rerun_only_dependent_stages() {
     terminal.wait("reused stages", |screen| {
         ["4 stages", "4"].iter().any(|count| screen.contents().contains(&messages::cached(count)))
     });
-    assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 kept".to_owned()));
+    assert_eq!(stages(&folder, "textures"), ("rrdrrsdd".to_owned(), "1 loaded, 1 cached".to_owned()));
 }
 
 /// Waits until all of these stage lines appear.

@@ -82,7 +82,7 @@ fn quit_after_save_writes_or_reports() {
     let mut terminal = folder.terminal();
     terminal.wait_for("rendering");
     terminal.press("wq");
-    assert_eq!(terminal.end_saying("nothing is written|there is no picture yet"), 0);
+    assert_eq!(terminal.end_saying("nothing is written|no image has been rendered yet"), 0);
     assert!(!folder.path("scene.png").exists());
 }
 
@@ -117,7 +117,7 @@ fn keys_during_a_write_never_lose_the_image() {
     terminal.wait_for("ETA");
     terminal.press("w");
     terminal.press("q");
-    assert_eq!(terminal.end_saying("wrote scene.png|nothing is written|there is no picture yet"), 0);
+    assert_eq!(terminal.end_saying("wrote scene.png|nothing is written|no image has been rendered yet"), 0);
 }
 
 #[test]

@@ -35,7 +35,7 @@ fn model_is_watched_and_kept_once() {
     assert!(text.contains("[[mesh]]\nfile = \"wall.obj\"\n") && text.contains("[camera]"), "{text}");
     assert_eq!(fs::read_to_string(folder.path("wall.obj")).expect("the model"), wall(0.7));
     terminal.press("c");
-    terminal.wait_for("wall.toml exists already, and is left as it is");
+    terminal.wait_for(&format!("wall.toml {}", glimt::pipeline::messages::ALREADY_EXISTS));
     // The file is saved incompletely, then completely.
     folder.write("wall.obj", "v 0 0");
     terminal.wait_for("wall.obj");
@@ -66,5 +66,5 @@ fn missing_model_is_named() {
     terminal.resize(120, 40);
     fs::remove_file(folder.path("wall.obj")).expect("removed");
     terminal.press("c");
-    terminal.wait_for("wall.obj is gone: its scene is not written");
+    terminal.wait_for(&format!("wall.obj {}", glimt::pipeline::messages::MODEL_MISSING));
 }

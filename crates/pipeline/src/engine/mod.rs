@@ -1,11 +1,10 @@
-//! One request from the scene file to pictures on disk: the stages in their order, and all that is kept between
-//! requests.
+//! The engine: runs the stages of one request, from the scene file to images on disk, and keeps state between requests.
 
+mod eviction;
 mod orders;
 mod outcome;
 mod outputs;
 mod own;
-mod spares;
 #[cfg(test)]
 mod tests;
 mod unfinished;
@@ -18,27 +17,25 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-pub(super) use self::orders::{Interruption, Meanwhile, Orders};
+pub(super) use self::orders::{Interruption, Orders, RequestContext};
 use self::outcome::Outcome;
 pub use self::outcome::{Rendered, Unrendered};
 use self::outputs::drop_report;
 use self::own::{OwnImage, lookups, own_plan};
-use self::unfinished::Good;
-use super::assembly::{Eye, Keyed, world};
+use self::unfinished::LastGoodScene;
+use super::assembly::{KeyedWorld, RequestCamera, world};
 use super::cache::{Memo, Pool};
-use super::cautions::cautions;
-use super::errands::{AtHand, Errand};
 use super::inputs::Inputs;
 use super::keys;
-use super::memory::Foretold;
+use super::memory::MemoryEstimate;
 use super::model::Show;
-use super::pace::Stopwatch;
 use super::plan::{NamedBy, Plan, cores, plan, threads};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
+use super::queries::{Query, QueryContext};
+use super::render::checkpointer::CheckpointLock;
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
-use super::render::keeping::Claim;
 use super::render::layers;
 use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
@@ -51,21 +48,24 @@ use super::stages::containers::Containers;
 use super::stages::coplanar::coplanar;
 use super::stages::glass::glass;
 use super::stages::lights::{SkyMemo, lights};
-use super::stages::meshes::{KeptMesh, MeshName, Meshes, meshes};
-use super::stages::parse::{Origin, Parsed, parse};
-use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
+use super::stages::meshes::{CachedMesh, MeshName, Meshes, meshes};
+use super::stages::parse::{Parsed, SceneSource, parse};
+use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, photons};
 use super::stages::render::render;
-use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Frames, Written, check_targets, write_by_hand};
+use super::stages::textures::{NeededTextures, TextureCache, Textures, add_declared, needed, textures};
+use super::stages::write::{Destination, Frames, WrittenFiles, check_targets, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop};
+use super::stopwatch::Stopwatch;
 use super::table::StageTable;
 use super::targets::conflicts;
 use super::trace::{Kernel, Tracer};
+use super::warnings::settings_warnings;
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::messages::NO_IMAGE;
 use crate::output::LayerImage;
 use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
@@ -74,93 +74,93 @@ use crate::system::priority;
 use crate::system::threads::{check_stack_space, start_failure};
 use crate::world::{Coplanar, GlassSolids, TextureNeeds, World};
 
-/// Means of an engine; tests replace some of them.
+/// Configuration of an engine, which tests change.
 #[derive(Clone, Copy)]
-pub(super) struct Means {
+pub(super) struct EngineConfig {
     pub(super) kernel: Kernel,
-    /// Most bytes of one film.
+    /// Maximum number of bytes of a film.
     pub(super) most_film_bytes: u64,
-    /// Difference between the nice values of the render threads and of the thread that starts them.
+    /// Difference in niceness between the render threads and the thread that starts them.
     pub(super) nice: u8,
 }
 
-impl Default for Means {
+impl Default for EngineConfig {
     fn default() -> Self {
         Self { kernel: crate::integrators::render_tile_with_photons, most_film_bytes: u64::MAX, nice: 0 }
     }
 }
 
-/// All that is kept from request to request.
+/// Runs requests and keeps state between them.
 pub(super) struct Engine {
-    means: Means,
+    config: EngineConfig,
     contents: Arc<Contents>,
     parsed: Memo<Arc<Parsed>>,
-    meshes: Pool<MeshName, KeptMesh>,
+    meshes: Pool<MeshName, CachedMesh>,
     bodies: Memo<Arc<GlassSolids>>,
     coplanar: Memo<Vec<Coplanar>>,
     textures: TextureCache,
     accel: AccelCache,
-    /// Number of requests so far.
+    /// Number of finished requests.
     requests: u64,
     lights: Memo<Arc<Lights>>,
     sky: SkyMemo,
     world: Memo<Arc<World>>,
     photons: PhotonCache,
     films: FilmCache,
-    written: Written,
+    written: WrittenFiles,
     own: Option<OwnImage>,
-    /// Whether the film of the own image stays, whatever else is rendered.
+    /// Whether the film of the own image is kept while other images are rendered.
     pins_own: bool,
-    /// Whether the plan of the current film is that of the scene's own image.
+    /// Whether the current film belongs to the scene's own image.
     is_own: bool,
-    /// Report of the newest request, once it is finished.
+    /// Report of the newest request, if it has finished.
     report: Option<Report>,
-    /// Frames of a turntable so far.
+    /// Finished frames of a turntable.
     frames: Frames,
     /// Layers of the current film.
     layers: Vec<LayerImage>,
     /// Plan of the current film.
     plan: Option<Plan>,
-    at_hand: Option<AtHand>,
-    /// The last scene that could be read, with what it names.
-    good: Option<Good>,
-    /// Pixels of first pictures that are traced in a second, as the last one was.
+    query_context: Option<QueryContext>,
+    /// The last valid scene, with the files it references.
+    good: Option<LastGoodScene>,
+    /// Pixels per second of the last first image.
     coarse_rate: Cell<Option<f64>>,
     pool: Option<Arc<ThreadPool>>,
-    /// The assets of the last scene that could be read: they stay watched while it is broken.
+    /// Assets of the last valid scene, which are watched while the scene file is broken.
     assets: Vec<FileRead>,
-    /// All files that must not be written: what the last scene that could be read is made of, and what was named since.
+    /// All files that must not be written: files of the last valid scene, and files referenced since.
     inputs: Inputs,
-    /// Whether the scene as it is now could not be read: nobody knows all the files that it names.
+    /// Whether the current scene file is invalid, so that the files it references are unknown.
     is_broken: bool,
-    /// Checkpoints that were met.
-    claim: RefCell<Claim>,
+    /// Lock of the checkpoint file, and checkpoints already reported.
+    checkpoint_lock: RefCell<CheckpointLock>,
 }
 
-/// Most times that the files of a scene are read for one request, if they change meanwhile.
+/// Maximum number of times that a request starts again because the scene's files change.
 const MOST_READS: usize = 16;
 
-/// Everything that is ready to be rendered.
+/// A scene that is ready to be rendered.
 #[derive(Clone)]
 struct Ready {
     parsed: Arc<Parsed>,
     plan: Plan,
-    world: Keyed,
-    /// Key of all surfaces and of the origin of their coordinates.
+    world: KeyedWorld,
+    /// Key of all surfaces and of their coordinate origin.
     surfaces: Key,
     origin: DVec3,
     /// Key of the film.
     film: Key,
     texels_loaded: u64,
     texture_memory_bytes: u64,
-    /// The share of the picture that is rendered. `None` for all of it.
+    /// Share of the image that this process renders. `None` for the whole image.
     share: Option<Share>,
 }
 
 impl Engine {
-    pub(super) fn new(means: Means, contents: Arc<Contents>) -> Self {
+    pub(super) fn new(config: EngineConfig, contents: Arc<Contents>) -> Self {
         Self {
-            means,
+            config,
             contents,
             parsed: Memo::default(),
             meshes: Pool::default(),
@@ -174,7 +174,7 @@ impl Engine {
             world: Memo::default(),
             photons: PhotonCache::default(),
             films: FilmCache::default(),
-            written: Written::default(),
+            written: WrittenFiles::default(),
             own: None,
             pins_own: true,
             is_own: true,
@@ -182,21 +182,21 @@ impl Engine {
             frames: Frames::default(),
             layers: Vec::new(),
             plan: None,
-            at_hand: None,
+            query_context: None,
             good: None,
             coarse_rate: Cell::new(None),
             pool: None,
             assets: Vec::new(),
             inputs: Inputs::default(),
             is_broken: false,
-            claim: RefCell::default(),
+            checkpoint_lock: RefCell::default(),
         }
     }
 
-    /// Carries out a request and reports its outcome.
-    pub(super) fn request(&mut self, request: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
+    /// Runs a request and sends its outcome. If the scene is invalid, renders the last good one.
+    pub(super) fn request(&mut self, request: &Request, sink: &Sink, context: &RequestContext<'_>) {
         let generation = request.generation;
-        let outcome = self.outcome(request, sink, meanwhile);
+        let outcome = self.outcome(request, sink, context);
         let is_broken = matches!(outcome, Err(Stop::Failed(Failure::Scene(_))));
         sink.send(match outcome {
             Ok(Outcome { report, conflicts, warnings, unchanged }) => {
@@ -207,26 +207,26 @@ impl Engine {
             Err(Stop::Failed(failure)) => Event::Failed { generation, failure },
         });
         if is_broken {
-            self.go_on(request, sink, meanwhile);
+            self.go_on(request, sink, context);
         }
     }
 
-    /// Carries out a request.
+    /// Runs a request.
     fn outcome(
         &mut self,
         request: &Request,
         sink: &Sink,
-        meanwhile: &Meanwhile<'_>,
+        context: &RequestContext<'_>,
     ) -> Result<Outcome, Stop> {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
         let before = self.shown();
-        let outcome = self.run(request, sink, meanwhile, &mut findings);
+        let outcome = self.run(request, sink, context, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
-            findings.read_named(diagnostics, &request.scene, &self.contents, meanwhile.token);
+            findings.read_named(diagnostics, &request.scene, &self.contents, context.token);
         }
-        // What is watched cannot be written.
+        // Files that are watched must not be written.
         self.inputs.add_read(&findings.files);
         match &outcome {
             Ok(_) => self.is_broken = false,
@@ -236,11 +236,11 @@ impl Engine {
         if let Ok(report) = &outcome {
             self.report = Some(report.clone());
             if request.own.is_none() && findings.conflicts.is_empty() {
-                self.write_report(report, sink, meanwhile.writing);
+                self.write_report(report, sink, context.writing);
             }
         }
         self.say_files(&findings, sink);
-        // What was read to the end stays for whoever comes next, even if the render was stopped.
+        // Keep fully read files for later requests even if the render was stopped.
         let is_read = self.good.as_ref().is_some_and(|good| good.generation == generation);
         self.end(outcome.is_ok() || is_read);
         let report = outcome?;
@@ -250,24 +250,24 @@ impl Engine {
         Ok(Outcome { report, conflicts, warnings, unchanged })
     }
 
-    /// The current picture and its view.
+    /// Returns the key of the current image, and its view.
     fn shown(&self) -> (Option<Key>, Option<View>) {
         let view = self.plan.as_ref().map(|plan| plan.settings.view);
-        (self.films.current().map(|canvas| canvas.key), view)
+        (self.films.current().map(|state| state.key), view)
     }
 
-    /// Show the picture as it is at another size, outside of a request.
+    /// Sends a preview of the current image at another size, outside of a request.
     pub(super) fn show_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
-        if let (Some(canvas), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
-            Screen { bounds, plan, sink }.show(canvas, pool, token);
+        if let (Some(state), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
+            Screen { bounds, plan, sink }.show(state, pool, token);
         }
     }
 
-    /// Answers a question about the current picture, outside of a request.
-    pub(super) fn errand(&self, errand: &Errand, sink: &Sink) {
-        match &self.at_hand {
-            Some(at_hand) => at_hand.run(errand, self.films.current(), &self.inputs, sink),
-            None => errand.fail("there is no picture yet", sink),
+    /// Answers a query about the current image, outside of a request.
+    pub(super) fn query(&self, query: &Query, sink: &Sink) {
+        match &self.query_context {
+            Some(query_context) => query_context.run(query, self.films.current(), &self.inputs, sink),
+            None => query.fail(NO_IMAGE, sink),
         }
     }
 
@@ -275,48 +275,48 @@ impl Engine {
         &mut self,
         request: &Request,
         sink: &Sink,
-        meanwhile: &Meanwhile<'_>,
+        context: &RequestContext<'_>,
         findings: &mut Findings,
     ) -> Result<Report, Stop> {
-        let watch = Stopwatch::start(meanwhile.token);
-        let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: false };
-        // Nobody comes back to the pictures before in a turntable.
+        let watch = Stopwatch::start(context.token);
+        let mut table = StageTable { sink, token: context.token, stages: Vec::new(), is_silent: false };
+        // A turntable does not return to earlier images.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
-        let mut ready = self.prepare_of_one_version(request, &mut table, meanwhile.token, findings)?;
-        let photons = self.light(request, &ready, &mut table, sink, meanwhile)?;
+        let mut ready = self.prepare_of_one_version(request, &mut table, context.token, findings)?;
+        let photons = self.light(request, &ready, &mut table, sink, context)?;
         let share = self.share(&ready.plan, photons);
-        // A share of blocks has fewer samples than the picture.
+        // Blocks with fewer samples than the image belong to a share.
         if let Some(share) = &share {
             ready.plan.settings.render.samples = share.own_samples();
         }
         ready.share = share;
         self.share_own(request, &ready);
         self.say_own(request, ready.film, sink);
-        let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, meanwhile))?;
+        let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, context))?;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
         let was_own_written = self.is_own_written();
         let written =
-            table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing));
+            table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, context.writing));
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
         self.say_own(request, ready.film, sink);
         let film = own::is_to_be_written(request).then_some(ready.film);
-        let interruption = || meanwhile.orders.interruption();
-        self.with_keeping(film, sink, &interruption, |keeping, engine| {
-            if let (Some(keeping), Some(canvas)) = (keeping, engine.films.current()) {
-                keeping.finish(canvas, canvas.traced, is_written || engine.is_own_written());
+        let interruption = || context.orders.interruption();
+        self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
+            if let (Some(checkpointer), Some(state)) = (checkpointer, engine.films.current()) {
+                checkpointer.finish(state, state.traced, is_written || engine.is_own_written());
             }
         });
         let is_written = written?;
         let pool = self.pool(ready.plan.threads)?;
-        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let Some(state) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let finished = Finished {
             scene: &ready.parsed.loaded.path,
             plan: &ready.plan,
             world: &ready.world.1,
-            canvas,
+            state,
             films: &self.films,
             rays,
             texels_loaded: ready.texels_loaded,
@@ -331,28 +331,28 @@ impl Engine {
         {
             let finished = Finished { plan: &own.plan, is_written: true, ..finished };
             let report = pool.install(|| report(&finished, stages.clone(), seconds));
-            self.write_report(&report, sink, meanwhile.writing);
+            self.write_report(&report, sink, context.writing);
         }
         Ok(pool.install(|| report(&finished, stages, seconds)))
     }
 
-    /// Sends photons, and makes this the picture at hand. Gives the key of the photons that the picture gathers.
+    /// Traces photons, and makes `ready` the current image. Returns the key of the photons that the image uses.
     fn light(
         &mut self,
         request: &Request,
         ready: &Ready,
         table: &mut StageTable<'_>,
         sink: &Sink,
-        meanwhile: &Meanwhile<'_>,
+        context: &RequestContext<'_>,
     ) -> Result<Option<Key>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
         let (plan, world) = (&ready.plan, &ready.world.1);
-        let sending = Sending { world, plan, pool: &pool, token: meanwhile.token, sink };
+        let sending = PhotonContext { world, plan, pool: &pool, token: context.token, sink };
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key =
             |of_photons| keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
-        let own = Eye::new(&plan.scene, ready.parsed.orbiter, &CameraChange::default()).viewpoint();
-        let at_hand = AtHand {
+        let own = RequestCamera::new(&plan.scene, ready.parsed.orbiter, &CameraChange::default()).viewpoint();
+        let query_context = QueryContext {
             own,
             parsed: ready.parsed.clone(),
             sets: request.overrides.sets.clone(),
@@ -361,13 +361,13 @@ impl Engine {
         };
         let (store, inputs) = (&mut self.photons, &self.inputs);
         let hear = || {
-            meanwhile.postpone_write(sink);
-            meanwhile.run_errand(&at_hand, None, inputs, sink);
+            context.postpone_write(sink);
+            context.run_query(&query_context, None, inputs, sink);
         };
-        // A person sees the scene while the first photons are traced.
+        // Show the scene to the user while the first photons are traced.
         let is_new = request.force || self.films.of(ready.film).is_none();
         let coarse = FirstPictures {
-            tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
+            tracer: tracer(self.config.kernel, &pool, ready, context.token),
             plan,
             is_moved: request.overrides.camera.is_any(),
             rate: &self.coarse_rate,
@@ -378,11 +378,11 @@ impl Engine {
         let photons_key = plan.settings.effective().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
         (self.is_own, self.report) = (request.own.is_none(), None);
-        self.at_hand = Some(at_hand);
+        self.query_context = Some(query_context);
         Ok(photons_key)
     }
 
-    /// [`Self::prepare`], again if a file changes while it is read: no image mixes two versions of a file.
+    /// Runs [`Self::prepare`], again if a file changes meanwhile: no image mixes two versions of a file.
     fn prepare_of_one_version(
         &mut self,
         request: &Request,
@@ -400,11 +400,11 @@ impl Engine {
             table.stages.clear();
         }
         Err(Stop::work(
-            "files of the scene change while they are read; render again when nothing writes them",
+            "files of the scene keep changing while they are read; render again once they are complete",
         ))
     }
 
-    /// All stages before photons and light.
+    /// Runs all stages before photons and rendering.
     fn prepare(
         &mut self,
         request: &Request,
@@ -414,10 +414,10 @@ impl Engine {
     ) -> Result<Ready, Stop> {
         let containers = Containers::default();
         let show = Show::of(&request.overrides);
-        // The scene cannot change the number of threads, and a model is read by all of them.
+        // The scene cannot change the number of threads, and reading a model uses all of them.
         let pool = self.pool(threads(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
-            let origin = Origin { path: &request.scene, sets: &request.overrides.sets, show };
+            let origin = SceneSource { path: &request.scene, sets: &request.overrides.sets, show };
             pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
         })?;
         let text = parsed.loaded.source.shared_text();
@@ -425,10 +425,11 @@ impl Engine {
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         let own_plan = own_plan(request, &parsed)?;
-        self.check_memory(&Foretold::of_picture(&plan), request, (&plan, own_plan.as_ref()))?;
-        let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
-        findings.warnings.extend(cautions);
-        let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
+        self.check_memory(&MemoryEstimate::of_picture(&plan), request, (&plan, own_plan.as_ref()))?;
+        let settings_warnings =
+            settings_warnings(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
+        findings.warnings.extend(settings_warnings);
+        let own = RequestCamera::new(&plan.scene, parsed.orbiter, &CameraChange::default());
         let scene = &parsed.loaded.scene;
         table.sink.send(Event::Settings {
             generation: request.generation,
@@ -443,7 +444,7 @@ impl Engine {
         });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
-        // The picture at hand, which may yet be written, is of the scene before.
+        // The current image is of the previous scene and may still be written.
         self.inputs.add(before);
         looked?;
         if findings.conflicts.is_empty() {
@@ -451,37 +452,37 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
-        // The keys of the own image's film are those of its textures, too.
+        // The film of the scene's own image has keys that include its textures.
         let lookups = lookups(&plan, own_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         if let Some(path) = contents.changed() {
-            return Err(Stop::work(format!("{} changed while it was read", path.display())));
+            return Err(Stop::work(format!("{} changed while it was being read", path.display())));
         }
-        let foretold = Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
-        self.check_memory(&foretold, request, (&plan, own_plan.as_ref()))?;
+        let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
+        self.check_memory(&estimate, request, (&plan, own_plan.as_ref()))?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
-        let good = Good { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
+        let good = LastGoodScene { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
         let ready = self.build(request, &good, (plan, own_plan), table, &reading)?;
         self.good = Some(good);
         Ok(ready)
     }
 
-    /// Trees, lights and world of a scene whose files are loaded.
+    /// Builds the trees, lights and world of a loaded scene.
     fn build(
         &mut self,
         request: &Request,
-        good: &Good,
+        good: &LastGoodScene,
         (plan, own): (Plan, Option<Plan>),
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
     ) -> Result<Ready, Stop> {
-        let Good { parsed, meshes, bodies, textures, .. } = good;
+        let LastGoodScene { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
-        let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
+        let eye = RequestCamera::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
-        // The orbiter's numbers are few: their text stands for them.
+        // The orbiter's few numbers go into the key as text.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let of = keys::referents(scene, &mesh_keys, orbiter.as_deref());
         let origin = eye.origin();
@@ -497,7 +498,7 @@ impl Engine {
         let film = keys::render(world.0, &plan.settings, plan.crop);
         let camera = own::overrides(request).camera;
         let own = own.unwrap_or_else(|| plan.clone());
-        let own_eye = Eye::new(&own.scene, parsed.orbiter, &camera).turned(own.turn);
+        let own_eye = RequestCamera::new(&own.scene, parsed.orbiter, &camera).turned(own.turn);
         let own = OwnImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
         self.take_own(own);
         Ok(Ready {
@@ -513,13 +514,13 @@ impl Engine {
         })
     }
 
-    /// The share of the picture that this process renders. `None` for all of it.
+    /// Returns the share of the image that this process renders. `None` for the whole image.
     fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Share> {
         let are_sent = photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::are_sent);
         plan.shard.map(|shard| Share::new(shard, are_sent, plan.settings.render.samples))
     }
 
-    /// All files that the scene names; every one is tried before the first error ends it.
+    /// Loads all files that the scene references. Tries every file before it returns an error.
     fn load(
         &mut self,
         parsed: &Parsed,
@@ -527,7 +528,7 @@ impl Engine {
         findings: &mut Findings,
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
-    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, Needed), Stop> {
+    ) -> Result<(Meshes, Arc<GlassSolids>, Textures, NeededTextures), Stop> {
         let loaded = &parsed.loaded;
         let (cache, mesh_cache) = (&mut self.textures, &mut self.meshes);
         let found = table.run(Stage::Meshes, || meshes(loaded, mesh_cache, findings, reading))?;
@@ -553,26 +554,26 @@ impl Engine {
         ready: &Ready,
         photons: Option<Key>,
         sink: &Sink,
-        meanwhile: &Meanwhile<'_>,
+        context: &RequestContext<'_>,
     ) -> Result<Staged<RayCounters>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
-        let (plan, orders) = (&ready.plan, meanwhile.orders);
+        let (plan, orders) = (&ready.plan, context.orders);
         let key = ready.film;
-        let watch = Stopwatch::start(meanwhile.token);
-        // What the stage changes is apart from what it reads.
+        let watch = Stopwatch::start(context.token);
+        // Separate the state that the stage changes from the state it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
         let is_own = request.own.is_none();
         let to =
             Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, is_own, sink };
-        let pulse = |canvas: &FilmState, is_covered: bool| {
+        let pulse = |state: &FilmState, is_covered: bool| {
             if !is_covered {
-                meanwhile.postpone_write(sink);
-            } else if orders.take_write() && write_by_hand(canvas, to, &mut written.borrow_mut()) {
+                context.postpone_write(sink);
+            } else if orders.take_write() && write_by_hand(state, to, &mut written.borrow_mut()) {
                 drop_report(plan, to.inputs, sink);
             }
-            if let Some(at_hand) = &self.at_hand {
-                meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);
+            if let Some(query_context) = &self.query_context {
+                context.run_query(query_context, Some(state), &self.inputs, sink);
             }
         };
         let mut images = Vec::new();
@@ -580,13 +581,13 @@ impl Engine {
         let of_picture = sink.within(layers::progress(wanted, None));
         let interruption = || orders.interruption();
         let film = own::is_to_be_written(request).then_some(key);
-        let rendered = self.with_keeping(film, sink, &interruption, |keeping, engine| {
+        let rendered = self.with_checkpointer(film, sink, &interruption, |checkpointer, engine| {
             let rendering = Rendering {
-                tracer: tracer(engine.means.kernel, &pool, ready, meanwhile.token),
+                tracer: tracer(engine.config.kernel, &pool, ready, context.token),
                 plan,
                 photons: photons.and_then(|key| engine.photons.get(key)),
                 preview: request.preview,
-                most_film_bytes: engine.means.most_film_bytes,
+                most_film_bytes: engine.config.most_film_bytes,
                 force: request.force,
                 first: request.first,
                 sink: if wanted.is_empty() { sink } else { &of_picture },
@@ -595,13 +596,13 @@ impl Engine {
                 is_moved: request.overrides.camera.is_any(),
                 coarse_rate: &engine.coarse_rate,
                 share: ready.share.clone(),
-                keeping,
+                checkpointer,
             };
             let rendered = render(key, &mut films, &rendering)?;
             if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
                 let made = layers::layers(state, &rendering, wanted);
-                if let (Err(_), Some(keeping)) = (&made, keeping) {
-                    keeping.finish(state, state.traced, false);
+                if let (Err(_), Some(checkpointer)) = (&made, checkpointer) {
+                    checkpointer.finish(state, state.traced, false);
                 }
                 images = made?;
             }
@@ -609,26 +610,26 @@ impl Engine {
         });
         self.layers = images;
         if ready.share.is_some()
-            && let Some(canvas) = films.current_mut()
+            && let Some(state) = films.current_mut()
         {
-            canvas.identity = self.own.as_ref().map(OwnImage::identity);
+            state.identity = self.own.as_ref().map(OwnImage::identity);
         }
         (self.films, self.written) = (films, written.into_inner());
         let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
-        if let Some(canvas) = self.films.current_mut().filter(|canvas| canvas.key == key && !is_reused) {
-            canvas.render_seconds += watch.seconds();
+        if let Some(state) = self.films.current_mut().filter(|state| state.key == key && !is_reused) {
+            state.render_seconds += watch.seconds();
         }
         rendered
     }
 
-    /// The pool of this many threads; kept while the number stays.
+    /// Returns a pool with this many threads. The pool is kept while the number is unchanged.
     fn pool(&mut self, threads: usize) -> Result<Arc<ThreadPool>, Stop> {
         if let Some(pool) = self.pool.as_ref().filter(|pool| pool.current_num_threads() == threads) {
             return Ok(pool.clone());
         }
         self.pool = None;
         let name = |index| format!("glimt-{index}");
-        let nice = self.means.nice;
+        let nice = self.config.nice;
         let begin = move |_| priority::lower_thread_priority(nice);
         let failed = |error: &dyn Display| match threads {
             1 => Stop::work(start_failure("a thread", false, &error)),
@@ -647,7 +648,7 @@ impl Engine {
         sink.files(files, findings.files.len(), findings.begun);
     }
 
-    /// For `check`: the scene and all files that it names, needed or not.
+    /// Loads the scene and all files it references, needed or not, for `check`.
     pub(super) fn read_all(
         &mut self,
         path: &Path,
@@ -659,7 +660,7 @@ impl Engine {
         let mut all = || {
             let contents = &Snapshot::of(Arc::clone(&self.contents));
             let containers = Containers::default();
-            let origin = Origin { path, sets, show: Show::default() };
+            let origin = SceneSource { path, sets, show: Show::default() };
             let pool = self.pool(cores())?;
             let read = || parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token);
             let parsed = pool.install(read)?.value;
@@ -675,7 +676,7 @@ impl Engine {
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
-            findings.warnings.extend(cautions(loaded, &plan.scene, &plan.settings, &overrides));
+            findings.warnings.extend(settings_warnings(loaded, &plan.scene, &plan.settings, &overrides));
             if plan.named_by == NamedBy::Scene {
                 let inputs = inputs(&parsed, &found, &findings);
                 findings.errors.extend(conflicts(&plan, &inputs));
@@ -695,7 +696,7 @@ impl Engine {
     }
 }
 
-/// Tracer of a scene, without photons.
+/// Creates a tracer of a scene, without photons.
 fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
     Tracer {
         kernel,
@@ -708,7 +709,7 @@ fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a
     }
 }
 
-/// All files that the scene names, and what else was read.
+/// Collects the files that the scene references and all other files that were read.
 fn inputs(parsed: &Parsed, meshes: &Meshes, findings: &Findings) -> Inputs {
     let mut inputs = Inputs::of_scene(parsed);
     inputs.add_meshes(&parsed.loaded, meshes);

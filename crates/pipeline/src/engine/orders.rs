@@ -1,71 +1,71 @@
-//! Orders that a request hears while it is under way.
+//! Orders from the front end during a request.
 
 use std::cell::Cell;
 
 use crate::control::CancelToken;
-use crate::errands::{AtHand, Errand};
 use crate::inputs::Inputs;
 use crate::protocol::{Event, PreviewSize};
+use crate::queries::{Query, QueryContext};
 use crate::render::film_state::FilmState;
 use crate::sink::Sink;
 
-/// Why a render is cancelled.
+/// Why a render is interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interruption {
-    /// Something else is rendered, or nothing: nobody comes back to it.
+    /// Another image, or nothing, replaces it. It will not be resumed.
     Replaced,
-    /// A person leaves: if it took long, it is gone on with later.
+    /// The user leaves. A long render will be resumed later.
     Left,
-    /// The process is ended: it is gone on with later.
+    /// The process is terminated. The render will be resumed later.
     Ended,
 }
 
-/// Orders that come while a request is under way.
+/// Orders that arrive during a request.
 pub(crate) trait Orders {
-    /// Whether the picture is to be written as it is.
+    /// Whether the current image should be written.
     fn wants_write(&self) -> bool;
-    /// The same, and the order is carried out.
+    /// Like [`Self::wants_write`], and clears the order.
     fn take_write(&self) -> bool;
-    /// The size that previews are to have from now on.
+    /// Takes the new size of previews.
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
-    /// The next question about the current picture.
-    fn take_errand(&self) -> Option<Errand>;
-    /// Why a render that is cancelled is not gone on with now.
+    /// Takes the next query about the current image.
+    fn take_query(&self) -> Option<Query>;
+    /// Why a cancelled render will not continue now.
     fn interruption(&self) -> Interruption;
 }
 
-/// Tokens and orders of a request while it is under way.
-pub(crate) struct Meanwhile<'a> {
+/// Tokens and orders of a running request.
+pub(crate) struct RequestContext<'a> {
     pub(crate) token: &'a CancelToken,
-    /// Token of the write stage, the last one.
+    /// Token of the write stage, which is the last one.
     pub(crate) writing: &'a CancelToken,
     pub(crate) orders: &'a dyn Orders,
-    /// Whether the front end knows that its order to write waits.
+    /// Whether the front end knows that its write order is postponed.
     is_postponed: Cell<bool>,
 }
 
-impl<'a> Meanwhile<'a> {
+impl<'a> RequestContext<'a> {
     pub(crate) fn new(token: &'a CancelToken, writing: &'a CancelToken, orders: &'a dyn Orders) -> Self {
         Self { token, writing, orders, is_postponed: Cell::new(false) }
     }
 
-    /// Tells the front end once that its order to write waits until every pixel has a sample.
+    /// Reports once that a write order is postponed until every pixel has a sample.
     pub(super) fn postpone_write(&self, sink: &Sink) {
         if self.orders.wants_write() && !self.is_postponed.replace(true) {
             sink.send(Event::WritePostponed { generation: sink.generation });
         }
     }
 
-    /// Answers the next question about the current picture.
-    pub(super) fn run_errand(
+    /// Answers the next query about the current image.
+    pub(super) fn run_query(
         &self,
-        at_hand: &AtHand,
-        canvas: Option<&FilmState>,
+        query_context: &QueryContext,
+        state: Option<&FilmState>,
         inputs: &Inputs,
         sink: &Sink,
     ) {
-        if let Some(errand) = self.orders.take_errand() {
-            at_hand.run(&errand, canvas, inputs, sink);
+        if let Some(query) = self.orders.take_query() {
+            query_context.run(&query, state, inputs, sink);
         }
     }
 }

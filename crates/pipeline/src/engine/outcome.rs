@@ -1,4 +1,4 @@
-//! Outcome of a request, for callers who ask for one picture and wait for it.
+//! Outcome of a request, for callers that render one image synchronously.
 
 use std::error::Error;
 use std::fmt;
@@ -7,29 +7,29 @@ use std::path::Path;
 use super::super::protocol::{Failure, Report, Request};
 use super::super::sink::Sink;
 use super::super::stages::Stop;
-use super::{Engine, Meanwhile};
+use super::{Engine, RequestContext};
 use crate::film::{Quantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::scene::report::{Style, render};
 
-/// A picture in memory.
+/// A rendered image.
 #[derive(Clone, Debug)]
 pub struct Rendered {
-    /// Linear light, unexposed.
+    /// Linear radiance without exposure.
     pub image: RadianceImage,
     /// Report of the request.
     pub report: Box<Report>,
     /// Likely mistakes in the scene.
     pub warnings: Vec<Diagnostic>,
-    /// All that its sums depend on, apart from the number of samples.
+    /// Key of everything that the image depends on, apart from the number of samples.
     pub key: Key,
 }
 
-/// Why there is no picture.
+/// Why no image was rendered.
 #[derive(Clone, Debug)]
 pub enum Unrendered {
-    /// The scene is wrong, or the work failed.
+    /// The scene is invalid, or the work failed.
     Failed(Failure),
     /// A cancel token stopped the work.
     Cancelled,
@@ -49,39 +49,39 @@ impl fmt::Display for Unrendered {
 
 impl Error for Unrendered {}
 
-/// Columns of a report of mistakes within an error.
+/// Line width of diagnostics within an error.
 const COLUMNS: usize = 120;
 
 /// Outcome of a finished request.
 pub(super) struct Outcome {
     pub(super) report: Report,
-    /// Why nothing is written.
+    /// Why no image is written.
     pub(super) conflicts: Vec<Diagnostic>,
     /// Likely mistakes in the scene.
     pub(super) warnings: Vec<Diagnostic>,
-    /// Whether neither the picture nor its view changed.
+    /// Whether the image and its view are unchanged.
     pub(super) unchanged: bool,
 }
 
 impl Engine {
-    /// Carries out a request; returns its picture too, with the key of all inputs.
+    /// Runs a request and returns its image.
     ///
     /// # Errors
-    /// Why there is no picture.
+    /// Why no image was rendered.
     pub(crate) fn rendered(
         &mut self,
         request: &Request,
         sink: &Sink,
-        meanwhile: &Meanwhile<'_>,
+        context: &RequestContext<'_>,
     ) -> Result<Rendered, Unrendered> {
-        match self.outcome(request, sink, meanwhile) {
-            // Who asks for a picture in memory writes none.
+        match self.outcome(request, sink, context) {
+            // A request for an image in memory does not write it, so there are no conflicts.
             Ok(Outcome { report, conflicts: _, warnings, unchanged: _ }) => {
-                let canvas = self.films.current();
+                let state = self.films.current();
                 let gone = || Unrendered::Failed(Failure::Work("the film is gone".to_owned()));
-                let canvas = canvas.ok_or_else(gone)?;
-                let image = canvas.film.image(Quantity::Radiance);
-                Ok(Rendered { image, report: Box::new(report), warnings, key: canvas.key })
+                let state = state.ok_or_else(gone)?;
+                let image = state.film.image(Quantity::Radiance);
+                Ok(Rendered { image, report: Box::new(report), warnings, key: state.key })
             }
             Err(Stop::Failed(failure)) => Err(Unrendered::Failed(failure)),
             Err(Stop::Cancelled) => Err(Unrendered::Cancelled),

@@ -1,4 +1,4 @@
-//! Files that the engine writes, and those that it must not.
+//! Output files of the engine, and files that it must not write.
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
@@ -11,30 +11,31 @@ use super::super::stages::{Findings, Staged, Stop};
 use super::super::targets::conflicts;
 use super::Engine;
 use crate::control::CancelToken;
+use crate::messages::{INCOMPLETE_IMAGE, NEWEST_IMAGE_NOT_WRITTEN, NO_IMAGE, SCENE_HAS_ERRORS};
 use crate::output::OutputError;
 
-/// Removes a report that is of another image than the files of a plan.
+/// Removes a report that does not describe the image in the files of a plan.
 pub(super) fn drop_report(plan: &Plan, inputs: &Inputs, sink: &Sink) {
     if let Err(error) = remove_report(plan, inputs, sink) {
-        sink.write_failed(None, format!("the report is of an earlier image: {error}"));
+        sink.write_failed(None, format!("the report describes an earlier image: {error}"));
     }
 }
 
 impl Engine {
-    /// Whether there is a picture without holes.
+    /// Whether every pixel of the current image has a sample.
     pub(crate) fn can_write(&self) -> bool {
         self.films.current().is_some_and(FilmState::is_covered)
     }
 
-    /// Write the picture as it is, outside of a request.
+    /// Writes the current image, outside of a request.
     pub(crate) fn write_now(&mut self, sink: &Sink) {
-        let (Some(canvas), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
-            return sink.write_failed(None, "there is no picture yet".to_owned());
+        let (Some(state), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
+            return sink.write_failed(None, NO_IMAGE.to_owned());
         };
-        if !canvas.is_covered() {
-            // Pictures of before are there.
-            let what = if self.written.is_empty() { "nothing is" } else { "the newest picture is not" };
-            let message = format!("{what} written: the render was stopped before every pixel had a sample");
+        if !state.is_covered() {
+            // Images of earlier requests may exist.
+            let what = if self.written.is_empty() { "no image written" } else { NEWEST_IMAGE_NOT_WRITTEN };
+            let message = format!("{what}: {INCOMPLETE_IMAGE}");
             return sink.write_failed(None, message);
         }
         if self.is_broken
@@ -42,7 +43,7 @@ impl Engine {
         {
             let path = path.display();
             let message = format!(
-                "nothing is written: the scene has errors and may name {path}, which was not written by this run; mend \
+                "no image written: {SCENE_HAS_ERRORS} and may reference {path}, which this run did not write; fix \
                  the scene first"
             );
             return sink.write_failed(None, message);
@@ -56,19 +57,19 @@ impl Engine {
             sink,
         };
         let written = &mut self.written;
-        let is_written = pool.install(|| write_by_hand(canvas, to, written));
-        let is_finished = canvas.is_finished(plan);
+        let is_written = pool.install(|| write_by_hand(state, to, written));
+        let is_finished = state.is_finished(plan);
         self.note_written(is_written && is_finished && self.is_own);
         if is_written {
             self.report_by_hand(sink);
         }
     }
 
-    /// Looks for outputs that must not be written. If the request can go on without them, tells the front end and keeps the
-    /// conflicts in the findings.
+    /// Looks for outputs that must not be written. If the request can continue without them, sends them to the front
+    /// end and adds them to the findings.
     ///
     /// # Errors
-    /// All conflicts, where the picture must be written.
+    /// All conflicts, if the image must be written.
     pub(super) fn look_for_conflicts(
         &self,
         request: &Request,
@@ -92,29 +93,30 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the report of an image that a key has written. If its render is not finished, there is none.
+    /// Writes the report of an image that the user has written with a key. If its render is not finished, removes an older
+    /// report.
     fn report_by_hand(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return drop_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
             plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
         let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
-        // Nobody cancels this token: a key ordered this image.
+        // This token is never cancelled, because the user asked for the image.
         self.write_report(&Report { image, ..report.clone() }, sink, &CancelToken::new());
     }
 
-    /// Writes the report of a request's image that is in its files, or could not be written.
+    /// Writes the report of a request whose image is written or could not be written.
     pub(super) fn write_report(&self, report: &Report, sink: &Sink, token: &CancelToken) {
         let Some(plan) = &self.plan else { return };
         if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
             let is_cancelled = matches!(error, OutputError::Cancelled(_));
             let message =
-                if is_cancelled { format!("the report is not written: {error}") } else { error.to_string() };
+                if is_cancelled { format!("report not written: {error}") } else { error.to_string() };
             sink.write_failed(None, message);
         }
     }
 
-    /// Whether the picture is on disk then.
+    /// Runs the write stage. Returns whether the image is on disk.
     pub(super) fn write(
         &mut self,
         request: &Request,
@@ -130,7 +132,7 @@ impl Engine {
             return self.write_own(sink, token);
         }
         let pool = self.pool(plan.threads)?;
-        let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
+        let Some(state) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let to = Destination {
             plan,
             layers: &self.layers,
@@ -142,12 +144,12 @@ impl Engine {
         let written = &mut self.written;
         let wrote = match plan.outputs.is_empty() {
             true => Staged::done(true, ""),
-            false => pool.install(|| write_if_wanted(request.write, canvas, to, written, token))?,
+            false => pool.install(|| write_if_wanted(request.write, state, to, written, token))?,
         };
         let own = self.own.as_ref().filter(|_| wrote.value);
         written.own = own.map(|own| own.image);
         let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
         let frames = &mut self.frames;
-        pool.install(|| write_moving(canvas, to, (turn, frames), token))
+        pool.install(|| write_moving(state, to, (turn, frames), token))
     }
 }

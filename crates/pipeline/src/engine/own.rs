@@ -1,20 +1,20 @@
-//! The scene's own image: the image of the scene file as saved, with the overrides of the command line. Keys may show something else
-//! meanwhile. Its film, its checkpoint and its files are kept until a request returns to it.
+//! The scene's own image: the saved scene with the overrides of the command line. Keys may show another image
+//! meanwhile. The own image's film, checkpoint and files are kept until a request returns to it.
 
 use std::sync::Arc;
 
 use super::orders::Interruption;
 use super::{Engine, Ready};
-use crate::assembly::Eye;
+use crate::assembly::RequestCamera;
 use crate::control::CancelToken;
-use crate::identity::Depends;
+use crate::identity::ImageDependencies;
 use crate::keys;
-use crate::memory::Foretold;
+use crate::memory::MemoryEstimate;
 use crate::output::part::Trait;
 use crate::plan::{Plan, plan};
-use crate::protocol::{Failure, OwnState, Request, Status, Writing};
+use crate::protocol::{Failure, OwnState, Request, Status, Writing, reasons};
+use crate::render::checkpointer::{CheckpointContext, Checkpointer};
 use crate::render::film_state::FilmState;
-use crate::render::keeping::{Around, Keeping};
 use crate::render::share::Share;
 use crate::scene::description::CameraChange;
 use crate::scene::fingerprint::{Fingerprint, Key};
@@ -26,25 +26,25 @@ use crate::stages::{Staged, Stop};
 use crate::watch::content::FileRead;
 use crate::world::TextureNeeds;
 
-/// The scene's own image, as the newest request found the scene.
+/// The scene's own image, as of the newest request.
 pub(super) struct OwnImage {
-    /// Key of its film.
+    /// Key of the film.
     pub(super) film: Key,
     /// Key of the finished image and its files.
     pub(super) image: Key,
     parsed: Arc<Parsed>,
     pub(super) plan: Plan,
     camera: CameraChange,
-    /// The files that it is made of.
+    /// Files that the image depends on.
     files: Vec<FileRead>,
-    /// The share of the image that this process renders. `None` for all of it.
+    /// Share of the image that this process renders. `None` for the whole image.
     pub(super) share: Option<Share>,
 }
 
 impl OwnImage {
-    /// `eye` is the scene's own camera; `surfaces` and `of` are the keys of the scene.
+    /// Creates the image. `eye` is the scene's own camera; `surfaces` and `meshes` are keys of the scene.
     pub(super) fn new(
-        (parsed, plan, eye): (&Arc<Parsed>, Plan, &Eye),
+        (parsed, plan, eye): (&Arc<Parsed>, Plan, &RequestCamera),
         (surfaces, meshes): (&Key, &[Key]),
         (camera, files): (CameraChange, &[FileRead]),
     ) -> Self {
@@ -56,15 +56,15 @@ impl OwnImage {
         Self { film, image, parsed: Arc::clone(parsed), plan, camera, files: files.to_vec(), share: None }
     }
 
-    /// Names and values of everything that the image depends on.
+    /// Returns the names and values of everything that the image depends on.
     pub(super) fn identity(&self) -> Vec<Trait> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
-        Depends { parsed, plan, camera, files, divided }.traits()
+        ImageDependencies { parsed, plan, camera, files, divided }.traits()
     }
 }
 
-/// Key of a finished image and its files.
+/// Returns the key of a finished image and its files.
 fn image_key(film: Key, plan: &Plan) -> Key {
     let mut key = Fingerprint::new("own image");
     key.key(&keys::image(film, plan, 0)).u64(plan.bit_depth.into());
@@ -78,7 +78,7 @@ fn image_key(film: Key, plan: &Plan) -> Key {
 }
 
 impl Engine {
-    /// Takes up the scene's own image of a request. Its film stays, whatever else is rendered.
+    /// Sets the scene's own image of a request. Its film is kept while other images are rendered.
     pub(super) fn take_own(&mut self, mut own: OwnImage) {
         if self.pins_own {
             self.films.pin(own.film);
@@ -89,21 +89,21 @@ impl Engine {
         self.own = Some(own);
     }
 
-    /// Checks the memory of a request. If keys show something else, the film of the scene's own image counts. Where it does not fit
-    /// beside theirs, it makes room once its image is written.
+    /// Checks the memory of a request. If keys show another image, the film of the scene's own image is included. If both do not fit,
+    /// the own film makes room once its image is written.
     ///
     /// # Errors
-    /// The request needs more than there is.
+    /// The request needs more memory than available.
     pub(super) fn check_memory(
         &mut self,
-        foretold: &Foretold,
+        estimate: &MemoryEstimate,
         request: &Request,
         plans: (&Plan, Option<&Plan>),
     ) -> Result<(), Stop> {
         let (plan, bytes) = (plans.0, self.own_film_bytes(request, plans));
-        let all = foretold.clone().with_own_film(bytes).check(plan);
+        let all = estimate.clone().with_own_film(bytes).check(plan);
         self.pins_own = all.is_ok() || !self.is_own_written();
-        let room = if self.pins_own { all? } else { foretold.check(plan)? };
+        let room = if self.pins_own { all? } else { estimate.check(plan)? };
         if !self.pins_own {
             self.films.unpin();
         }
@@ -111,57 +111,57 @@ impl Engine {
         Ok(())
     }
 
-    /// Bytes of the film that stays for the scene's own image beside the film of a request.
+    /// Returns the bytes of the scene's own film that is kept in addition to the film of a request.
     fn own_film_bytes(&self, request: &Request, (plan, own_plan): (&Plan, Option<&Plan>)) -> u64 {
         let (Some(own), Some(own_plan)) = (&self.own, own_plan) else { return 0 };
         let of = |plan: &Plan| keys::render(own.film, &plan.settings, plan.crop);
         let is_shared = of(plan) == of(own_plan) && request.overrides.camera == overrides(request).camera;
-        let canvas = self.films.of(own.film).filter(|canvas| canvas.is_begun() && !is_shared);
-        canvas.map_or(0, FilmState::memory_bytes)
+        let state = self.films.of(own.film).filter(|state| state.is_begun() && !is_shared);
+        state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// Notes the share of the scene's own image, if the request is of it.
+    /// Records the share of the scene's own image, if the request renders it.
     pub(super) fn share_own(&mut self, request: &Request, ready: &Ready) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
         }
     }
 
-    /// Tells the state of the scene's own image to a front end that shows something else.
+    /// Reports the state of the scene's own image while another one is shown.
     pub(super) fn say_own(&self, request: &Request, film: Key, sink: &Sink) {
         let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) else { return };
         sink.own_image(match self.films.of(own.film) {
             _ if self.is_own_written() => OwnState::Written,
-            Some(canvas) if canvas.is_begun() => OwnState::Begun { is_rendering: own.film == film },
+            Some(state) if state.is_begun() => OwnState::Begun { is_rendering: own.film == film },
             Some(_) | None => OwnState::NotBegun,
         });
     }
 
-    /// Whether the files of the scene's own image hold it.
+    /// Whether the files of the scene's own image contain it.
     pub(super) fn is_own_written(&self) -> bool {
         self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
     }
 
-    /// Notes whether the files of the current plan hold its finished image now.
+    /// Records whether the files of the current plan contain its finished image.
     pub(super) fn note_written(&mut self, is_written: bool) {
         let own = self.own.as_ref().filter(|_| is_written && self.is_own);
         self.written.own = own.map(|own| own.image);
     }
 
-    /// Writes the scene's own image, if the film that is shown in another way is its finished film.
+    /// Writes the scene's own image, if the current view shows its finished film in another way.
     ///
     /// # Errors
-    /// Cancelled.
+    /// [`Stop::Cancelled`].
     pub(super) fn write_own(&mut self, sink: &Sink, token: &CancelToken) -> Result<Staged<bool>, Stop> {
-        let only_shown = || Ok(Staged::skipped(false, "it is only shown"));
+        let only_shown = || Ok(Staged::skipped(false, reasons::PREVIEW_ONLY));
         if self.is_own_written() {
             return only_shown();
         }
-        let (Some(own), Some(canvas), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
+        let (Some(own), Some(state), Some(pool)) = (&self.own, self.films.current(), &self.pool) else {
             return only_shown();
         };
         let is_simple = own.plan.layers.is_empty() && own.plan.turn.is_none() && !own.plan.outputs.is_empty();
-        if canvas.key != own.film || !is_simple || !canvas.is_finished(&own.plan) {
+        if state.key != own.film || !is_simple || !state.is_finished(&own.plan) {
             return only_shown();
         }
         let to = Destination {
@@ -173,18 +173,18 @@ impl Engine {
             sink,
         };
         let written = &mut self.written;
-        let wrote = pool.install(|| write_if_wanted(Writing::Try, canvas, to, written, token))?;
+        let wrote = pool.install(|| write_if_wanted(Writing::Try, state, to, written, token))?;
         written.own = wrote.value.then_some(own.image);
-        Ok(Staged { value: false, status: Status::Skipped, why: "it is only shown".to_owned() })
+        Ok(Staged { value: false, status: Status::Skipped, why: reasons::PREVIEW_ONLY.to_owned() })
     }
 
-    /// Does something with the checkpoints of a film, if it is that of the scene's own image and has any.
-    pub(super) fn with_keeping<T>(
+    /// Calls `work` with a checkpointer, if `film` is the scene's own image and has checkpoints.
+    pub(super) fn with_checkpointer<T>(
         &self,
         film: Option<Key>,
         sink: &Sink,
         interruption: &dyn Fn() -> Interruption,
-        work: impl FnOnce(Option<&Keeping<'_>>, &Self) -> T,
+        work: impl FnOnce(Option<&Checkpointer<'_>>, &Self) -> T,
     ) -> T {
         let own = self.own.as_ref().filter(|own| film == Some(own.film) && keeps(&own.plan));
         let Some((own, output)) = own.and_then(|own| Some((own, own.plan.outputs.first()?))) else {
@@ -192,32 +192,32 @@ impl Engine {
         };
         let finish = finish(&own.plan);
         let name = || own.identity();
-        let around = Around {
+        let around = CheckpointContext {
             finish: &finish,
             inputs: &self.inputs,
             sink,
             name: &name,
             interruption,
-            claim: &self.claim,
+            lock: &self.checkpoint_lock,
         };
-        work(Some(&Keeping::new(output, own.plan.checkpoints, around)), self)
+        work(Some(&Checkpointer::new(output, own.plan.checkpoints, around)), self)
     }
 
-    /// Writes the checkpoint of the scene's own render when the worker ends while something else is shown.
+    /// Saves a checkpoint of the scene's own render when the worker stops while another image is shown.
     pub(crate) fn keep_own(&self, sink: &Sink, interruption: Interruption) {
         let Some(own) = self.own.as_ref().filter(|_| !self.is_own_written()) else { return };
-        let Some(canvas) = self.films.of(own.film).filter(|canvas| !canvas.is_kept) else { return };
-        self.with_keeping(Some(own.film), sink, &|| interruption, |keeping, _| {
-            if let Some(keeping) = keeping {
-                keeping.recognize(canvas);
-                keeping.at_the_end(canvas, canvas.traced, canvas.render_seconds);
+        let Some(state) = self.films.of(own.film).filter(|state| !state.is_kept) else { return };
+        self.with_checkpointer(Some(own.film), sink, &|| interruption, |checkpointer, _| {
+            if let Some(checkpointer) = checkpointer {
+                checkpointer.recognize(state);
+                checkpointer.at_the_end(state, state.traced, state.render_seconds);
             }
         });
     }
 }
 
-/// Whether the renders of a plan have checkpoints: its image is written to a file, and they are not switched off, or it goes on from
-/// one.
+/// Whether a plan's render has checkpoints: its image is written to a regular file, and checkpoints are enabled or it
+/// resumes from one.
 fn keeps(plan: &Plan) -> bool {
     let is_file =
         plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
@@ -225,28 +225,28 @@ fn keeps(plan: &Plan) -> bool {
     (seconds > 0.0 || resume == Resume::Asked) && is_file
 }
 
-/// Plan of the scene's own image, if the request shows something else.
+/// Returns the plan of the scene's own image, if the request shows another one.
 ///
 /// # Errors
-/// Those of [`plan`].
+/// Errors of [`plan`].
 pub(super) fn own_plan(request: &Request, parsed: &Parsed) -> Result<Option<Plan>, Stop> {
     let plan = |own: &Overrides| plan(&parsed.loaded.scene, &request.scene, own);
     let own = request.own.as_deref().map(plan).transpose();
     own.map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))
 }
 
-/// Textures that a request looks up. The keys of the films of both plans are made of them.
+/// Returns the textures that a request looks up. The keys of both plans' films depend on them.
 pub(super) fn lookups(plan: &Plan, own: Option<&Plan>) -> TextureNeeds {
     let shown = plan.settings.lookups();
     own.map_or(shown, |own| shown.or(own.settings.lookups()))
 }
 
-/// Overrides of the scene's own image in a request.
+/// Returns the overrides of the scene's own image in a request.
 pub(super) fn overrides(request: &Request) -> &Overrides {
     request.own.as_deref().unwrap_or(&request.overrides)
 }
 
-/// Whether the film of the scene's own image is to become a file.
+/// Whether the film of the scene's own image is meant to be written.
 pub(super) fn is_to_be_written(request: &Request) -> bool {
     request.own.is_some() || request.write != Writing::No
 }

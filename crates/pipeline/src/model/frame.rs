@@ -1,31 +1,31 @@
-//! The camera that frames a model, and its light.
+//! Framing of a model: its default camera and key light.
 
 use super::toml::rounded;
 use crate::math::DVec3;
 use crate::settings::Side;
 use crate::turntable::Turn;
 
-/// Vertical angle in degrees.
+/// Vertical field of view in degrees.
 pub(super) const FOV: f64 = 30.0;
-/// Part of the picture's half height and half width that the model's points may fill.
+/// Fraction of the image's half height and half width that the model's points may fill.
 const FILLED: f64 = 0.88;
 
-/// Least size of a model.
+/// Minimum size of a model.
 const LEAST: f64 = 1e-30;
 
-/// Pictures of a turntable that are measured: more are all alike.
+/// Maximum number of turntable frames that are measured; more directions add nothing.
 const MOST_MEASURED: u32 = 72;
 
-/// A camera.
+/// Position and orientation of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Eye {
+pub(super) struct CameraPose {
     pub(super) position: DVec3,
     pub(super) look_at: DVec3,
     pub(super) up: DVec3,
 }
 
 impl Side {
-    /// The way from the model to the eye, and what is up in the picture. Fronts face +z.
+    /// Direction from the model to the camera, and the up vector of the image. Fronts face +z.
     fn axes(self) -> (DVec3, DVec3) {
         match self {
             Self::Front => (DVec3::Z, DVec3::Y),
@@ -39,18 +39,18 @@ impl Side {
     }
 }
 
-/// The eye that sees a box, of which only these points are to be seen, as large as a picture of this width over height allows, and
-/// all pictures of a turntable with so many.
+/// Returns a camera that shows all `points` of a box as large as the image's aspect ratio allows, in all `turns` frames
+/// of a turntable.
 pub(super) fn framed(
     [least, greatest]: [DVec3; 2],
     points: &[DVec3],
     (from, turns): (Side, u32),
     aspect: f64,
-) -> Eye {
+) -> CameraPose {
     let (back, up) = from.axes();
     let middle = (least + greatest) * 0.5;
     let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
-    // Every point lies inside the frame.
+    // Move back until every point is inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
     for back in Turn::arms(turns.min(MOST_MEASURED), back, up) {
@@ -63,30 +63,30 @@ pub(super) fn framed(
         }
     }
     let distance = distance.max(LEAST);
-    // Digits that nobody sees are left out.
+    // Drop invisible digits.
     let size = half.length().max(LEAST);
     let step = size * 1e-4;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
-    Eye { position: tidy(middle + back * distance), look_at: tidy(middle), up }
+    CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
 }
 
-/// A number as a multiple of a power of ten near a step.
+/// Rounds to a multiple of a power of ten near `step`.
 pub(super) fn tidied(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
-    // A division gives fewer digits than a product with a fraction.
+    // Dividing gives fewer digits than multiplying by a fraction.
     if unit < 1.0 { whole / libm::round(1.0 / unit) } else { whole * unit }
 }
 
 /// Elevation of the key light in degrees.
 const ELEVATION: f64 = 50.0;
-/// Angle in degrees from the eye to the key light, to the left.
+/// Horizontal angle in degrees between the camera and the key light, to the left.
 const ASIDE: f64 = 40.0;
 
-/// The way that the key light travels: from above the left shoulder of whoever looks.
-pub(super) fn key_direction(eye: &Eye) -> DVec3 {
+/// Direction in which the key light travels: from above the viewer's left shoulder.
+pub(super) fn key_direction(eye: &CameraPose) -> DVec3 {
     let back = eye.position - eye.look_at;
-    // Seen from straight above or below, the front counts.
+    // For views from straight above or below, use the front.
     let flat = DVec3::new(back.x, 0.0, back.z);
     let flat = if flat.length() > 1e-3 * back.length() { flat.normalize() } else { DVec3::Z };
     let (sin, cos) = (libm::sin(ASIDE.to_radians()), libm::cos(ASIDE.to_radians()));
@@ -101,8 +101,8 @@ pub(super) const SKY: f64 = 0.5;
 /// Irradiance of the key light at normal incidence.
 pub(super) const KEY: f64 = 1.5;
 
-/// Reflectance of a level ground that is as bright as the sky behind it, so that no horizon is seen: what the sky brings,
-/// π·SKY, and the key light, over π.
+/// Reflectance of a level ground that is as bright as the sky behind it, which hides the horizon. Its irradiance is
+/// π·`SKY` plus the key light's.
 pub(super) fn ground_reflectance() -> f64 {
     let key = KEY * libm::sin(ELEVATION.to_radians()) / std::f64::consts::PI;
     rounded(SKY / (SKY + key), 3)
@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_corner_is_inside_the_frame_and_one_is_near_its_edge() {
+    fn corners_fill_the_frame() {
         let bounds = [DVec3::new(-1.0, 2.0, -3.0), DVec3::new(4.0, 3.0, 0.5)];
         for from in [Side::Front, Side::Back, Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Iso] {
             for aspect in [0.5, 1.0, 4.0 / 3.0, 3.0] {
@@ -139,9 +139,9 @@ mod tests {
         }
     }
 
-    /// A long model that is seen from its end stays in the frame when it is seen from its side.
+    /// A long model that is seen from its end must also fit when it is seen from its side.
     #[test]
-    fn every_picture_of_a_turntable_has_the_model_in_it() {
+    fn every_turntable_frame_contains_the_model() {
         let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
         let corners = [bounds[0], bounds[1], DVec3::new(-0.5, 1.0, 4.0), DVec3::new(0.5, 0.0, -4.0)];
         let distance = |turns| {
@@ -154,20 +154,20 @@ mod tests {
     }
 
     #[test]
-    fn digits_that_nobody_sees_are_left_out() {
+    fn invisible_digits_are_dropped() {
         assert_eq!(tidied(1.234_567_8, 3e-4), 1.2346);
         assert_eq!(tidied(-12_345.678, 30.0), -12_350.0);
     }
 
-    /// A plane under the sky and the key light alone has the sky's radiance.
+    /// A plane lit only by the sky and the key light has the sky's radiance.
     #[test]
-    fn the_ground_is_as_bright_as_the_sky() {
+    fn ground_is_as_bright_as_the_sky() {
         let eye = framed([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
         let direction = key_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;
         assert!((radiance / SKY - 1.0).abs() < 0.02, "{radiance}");
         let to_eye = (eye.position - eye.look_at).normalize();
-        assert!((-direction).dot(to_eye) > 0.3, "it comes from the side of the eye");
+        assert!((-direction).dot(to_eye) > 0.3, "the key light is on the camera's side");
     }
 }

@@ -1,15 +1,14 @@
-//! Scenes of glTF files.
+//! Conversion of glTF files to scene text.
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
 use std::path::Path;
 
 use super::frame::{framed, tidied};
-use super::materials::{Materials, TextureFile};
+use super::materials::{MaterialWriter, TextureFile};
 use super::toml::{Toml, color, list, number, vector};
 use super::{
-    Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
-    render,
+    CameraPose, FOV, Lighting, ModelText, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
 };
 use crate::assets::gltf::{
     Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
@@ -19,39 +18,40 @@ use crate::assets::{AssetError, Companion};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
+use crate::messages::INVISIBLE_MODEL;
 use crate::scene::keys::endings::MAPS;
 use crate::scene::quoted;
 use crate::settings::Side;
 use crate::stages::containers::Containers;
 
-/// The files in which the text finds parts and images.
+/// Where the generated scene finds its meshes and images.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Naming {
-    /// In the glTF file and the files that it names.
+    /// In the glTF file and the files it references.
     Inside,
-    /// In a folder of files of their own, beside the text.
+    /// In separate files in this folder, next to the scene.
     Folder(String),
 }
 
-/// A file that the text names.
+/// A file that the generated scene references.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Asset {
-    /// Its name, relative to the text.
+pub(crate) struct ExportedFile {
+    /// Path relative to the scene.
     pub(crate) name: String,
-    /// Its content.
-    pub(crate) content: Content,
+    /// Source of its content.
+    pub(crate) content: ExportSource,
 }
 
-/// The content of a file.
+/// Source of an exported file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Content {
-    /// A part as PLY.
+pub(crate) enum ExportSource {
+    /// A mesh part, written as PLY.
     Part(usize),
-    /// An image as it is.
+    /// An image, copied unchanged.
     Image(usize),
 }
 
-/// The scene of a glTF file.
+/// Converts a glTF file to scene text.
 pub(super) fn text(
     path: &Path,
     (show, naming): (Show, &Naming),
@@ -81,8 +81,8 @@ pub(super) fn text(
     let is_unseen = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
     let ModelScene { mut notes, .. } = scene;
     match naming {
-        // A model is shown without images that cannot be read.
-        Naming::Inside => notes.extend(is_unseen.then(|| UNSEEN.to_owned())),
+        // A preview tolerates unreadable images; an import does not.
+        Naming::Inside => notes.extend(is_unseen.then(|| INVISIBLE_MODEL.to_owned())),
         Naming::Folder(_) => {
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
         }
@@ -95,33 +95,33 @@ struct Writer<'a> {
     path: &'a Path,
     naming: &'a Naming,
     toml: Toml,
-    /// Names of files in the folder.
+    /// Names in use in the folder.
     files: Unique,
-    assets: Vec<Asset>,
-    names: HashMap<Content, String>,
-    /// Images that materials show.
+    assets: Vec<ExportedFile>,
+    names: HashMap<ExportSource, String>,
+    /// Images used by materials.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
-    /// Other files that the text was made of.
+    /// Other files that the text depends on.
     companions: Vec<Companion>,
 }
 
 impl Writer<'_> {
     fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: Show) {
-        // Say what this is, and what it is not.
+        // Describe the model and its approximations.
         self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
         for note in &scene.notes {
             self.toml.comment(note);
         }
-        // The picture, its camera and its light.
+        // Write the render settings, the camera and the lights.
         let own = scene.cameras.first().filter(|_| show.from.is_none());
         let aspect = show.aspect.or(own.and_then(|camera| camera.aspect));
         let size = own
             .and_then(|camera| camera.aspect)
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
         let lighting = match scene.lights.is_empty() {
-            true => Lighting::Ours { is_polished: scene.materials.iter().any(is_polished) },
-            false => Lighting::own(irradiance(&scene.lights, bounds)),
+            true => Lighting::Default { is_polished: scene.materials.iter().any(is_polished) },
+            false => Lighting::from_file(irradiance(&scene.lights, bounds)),
         };
         render(&mut self.toml, size, lighting);
         let eye = match own {
@@ -146,9 +146,9 @@ impl Writer<'_> {
             self.toml.section("1 cd of the file counts as 1 W/sr, 1 lx as 1 W/m².");
         }
         scene.lights.iter().for_each(|light| self.light(light));
-        // Materials, then what has them.
+        // Write the materials, then the meshes that use them.
         let mut names = Unique::default();
-        let materials = Materials::write(scene, &mut names, self);
+        let materials = MaterialWriter::write(scene, &mut names, self);
         let mut shapes = Unique::default();
         for instance in &scene.instances {
             self.mesh(instance, &materials[instance.material], &mut shapes);
@@ -196,7 +196,7 @@ impl Writer<'_> {
                 self.toml.key("part", instance.part.to_string());
             }
             Naming::Folder(_) => {
-                let name = self.asset(Content::Part(instance.part), base, "ply");
+                let name = self.asset(ExportSource::Part(instance.part), base, "ply");
                 self.toml.key("file", quoted(&name));
             }
         }
@@ -210,7 +210,7 @@ impl Writer<'_> {
         }
     }
 
-    /// `scale` and `translate` where these are enough, else `matrix`.
+    /// Writes `scale` and `translate`, or `matrix` if they are not enough.
     fn placement(&mut self, linear: &DMat3, translate: DVec3) {
         let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
         if *linear == DMat3::from_diagonal(scale) {
@@ -232,8 +232,8 @@ impl Writer<'_> {
         self.toml.key("matrix", format!("[{matrix},  0, 0, 0, 1]"));
     }
 
-    /// Name of a file in the folder, which is made if the content is new.
-    fn asset(&mut self, content: Content, wanted: &str, ending: &str) -> String {
+    /// Returns the file name for `content`, and adds a file if the content is new.
+    fn asset(&mut self, content: ExportSource, wanted: &str, ending: &str) -> String {
         if let Some(known) = self.names.get(&content) {
             return known.clone();
         }
@@ -245,7 +245,7 @@ impl Writer<'_> {
             wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
         let plain = plain.trim_matches('.').chars().take(60).collect::<String>().to_lowercase();
         let name = format!("{folder}{}.{ending}", self.files.name(&plain, "part"));
-        self.assets.push(Asset { name: name.clone(), content });
+        self.assets.push(ExportedFile { name: name.clone(), content });
         self.names.insert(content, name.clone());
         name
     }
@@ -274,7 +274,8 @@ impl super::materials::Files for Writer<'_> {
                 let name = file.strip_prefix(folder).unwrap_or(&file);
                 TextureFile { file: name.to_string_lossy().into_owned(), image: None }
             }
-            // A file without an ending is known by its content, as an image inside is. One that is missing is waited for.
+            // Without an image extension, the texture is read through the glTF file, where its content decides the
+            // format. A missing file is watched until it appears.
             (Naming::Inside, bytes) => {
                 if let Ok(ImageBytes::File(file)) = bytes {
                     self.companions.push(Companion { path: file, hash: None });
@@ -292,20 +293,20 @@ impl super::materials::Files for Writer<'_> {
                     Err(_) => "png".to_owned(),
                 };
                 let wanted = self.image_name(image);
-                let name = self.asset(Content::Image(image), &wanted, &ending);
+                let name = self.asset(ExportSource::Image(image), &wanted, &ending);
                 TextureFile { file: name, image: None }
             }
         }
     }
 }
 
-/// Whether a file has the ending of an image.
+/// Whether the file has the extension of an image format.
 fn has_ending(file: &Path) -> bool {
     let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     MAPS.contains(&ending.as_str())
 }
 
-/// Whether a material lets all light pass everywhere.
+/// Whether a material is fully transparent everywhere.
 fn is_clear(material: &ModelMaterial) -> bool {
     let is_clear = match &material.alpha {
         Alpha::Opaque => false,
@@ -315,7 +316,7 @@ fn is_clear(material: &ModelMaterial) -> bool {
     is_clear && material.glass.is_none()
 }
 
-/// Whether a material may throw light on others as a mirror does. A texture may have any number up to its factor.
+/// Whether a material may cast caustics. A texture may have any value up to its factor.
 fn is_polished(material: &ModelMaterial) -> bool {
     let is_smooth = |roughness: &Slot| roughness.texture.is_some() || roughness.factor.x < ROUGH;
     let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
@@ -323,8 +324,8 @@ fn is_polished(material: &ModelMaterial) -> bool {
     is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)
 }
 
-/// Irradiance at normal incidence that lights may bring to the middle of a box, all of them together. Lights inside it count from
-/// a quarter of its size.
+/// Upper bound of the irradiance at normal incidence that all lights together cause at the center of a box. Lights are
+/// treated as at least a quarter of the box's size away.
 fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
     let of_light = |light: &ModelLight| {
@@ -340,14 +341,14 @@ fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
     lights.iter().map(of_light).sum()
 }
 
-/// The first bytes of a file. `None` if it cannot be read.
+/// Reads the first bytes of a file. Returns `None` if it cannot be read.
 fn first_bytes(path: &Path) -> Option<[u8; 4]> {
     let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
     let mut start = [0; 4];
     file.read_exact(&mut start).ok().map(|()| start)
 }
 
-/// The ending of an image by its first bytes.
+/// Returns the extension of an image format from the first bytes of a file.
 fn ending(bytes: &[u8]) -> &'static str {
     if bytes.starts_with(b"\xff\xd8") {
         "jpg"
@@ -358,23 +359,23 @@ fn ending(bytes: &[u8]) -> &'static str {
     }
 }
 
-/// A number without the rest that a rotation by a right angle leaves.
+/// Clears the rounding error that a rotation by a right angle leaves.
 fn tidy(value: f64) -> f64 {
     if value.abs() < 1e-12 { 0.0 } else { value }
 }
 
-/// The eye of a file's camera. It looks at the depth of the model's middle.
-fn eye_of(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> Eye {
+/// Converts a file's camera. It looks at the depth of the model's center.
+fn eye_of(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
     let size = (greatest - least).length().max(1e-12);
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
     let up = if (camera.up - DVec3::Y).length() < 1e-6 || is_level(camera) { DVec3::Y } else { camera.up };
-    Eye { position: tidy(camera.position), look_at: tidy(look_at), up }
+    CameraPose { position: tidy(camera.position), look_at: tidy(look_at), up }
 }
 
-/// Whether a camera looks the same with y upwards.
+/// Whether the camera is level, so that an up vector of y gives the same view.
 fn is_level(camera: &ModelCamera) -> bool {
     let side = camera.direction.cross(DVec3::Y);
     side.length() > 1e-3 && camera.up.dot(side.normalize()).abs() < 1e-6 && camera.up.y > 0.0

@@ -1,10 +1,10 @@
-//! Scenes of glTF files as files of their own.
+//! Import of glTF files as scene files.
 
 use std::path::{Path, PathBuf};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::gltf::{Content, Naming};
+use super::gltf::{ExportSource, Naming};
 use super::{ModelText, Show, in_its_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
@@ -16,33 +16,33 @@ use crate::scene::load_generated;
 use crate::stages::containers::Containers;
 use crate::system::threads::{check_stack_space, start_failure};
 
-/// A scene that can be written.
+/// An imported scene, ready to be written.
 #[derive(Debug)]
 pub struct Imported {
-    /// Its text. Files that it names are relative to it.
+    /// Text of the scene. Its paths are relative to it.
     pub text: String,
-    /// The files that the text names, each with its path relative to the text.
+    /// Files that the text references, with paths relative to the text.
     pub files: Vec<(PathBuf, Vec<u8>)>,
-    /// Approximations, each with its place in the file.
+    /// Approximations, each with its location in the file.
     pub notes: Vec<String>,
 }
 
-/// Reasons for which a file is not imported, in words.
+/// Why a file cannot be imported, as a message.
 #[derive(Debug)]
 pub enum ImportError {
-    /// Something is wrong with the file, or with the call.
+    /// The file or the command line is invalid.
     File(String),
-    /// The work failed: there is no memory, or no thread.
+    /// Not enough memory or threads.
     Work(String),
 }
 
-/// Reads a file of another program as a scene whose other files are in a folder of this name.
+/// Imports a glTF file as a scene whose other files are in `folder`.
 ///
 /// # Errors
-/// What is wrong with the file or the machine; or the token is cancelled.
+/// The file is invalid, the machine lacks resources, or the token is cancelled.
 pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported, ImportError> {
     if !is_gltf(path) {
-        let message = format!("{} is no file that can be imported: .gltf or .glb", path.display());
+        let message = format!("cannot import {}: only .gltf and .glb files are supported", path.display());
         return Err(ImportError::File(message));
     }
     let pool = pool().map_err(|error| ImportError::Work(start_failure("threads", false, &error)))?;
@@ -56,9 +56,11 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
-                Content::Part(part) => write::bytes(&container.part(part, &ignore_progress, token)?.mesh),
-                Content::Image(image) => {
-                    // Files from anywhere could be copied under the name of an image.
+                ExportSource::Part(part) => {
+                    write::bytes(&container.part(part, &ignore_progress, token)?.mesh)
+                }
+                ExportSource::Image(image) => {
+                    // Check the content: otherwise arbitrary files could be copied as images.
                     container.check_image(image, token)?;
                     container.image_content(image, token)?
                 }
@@ -75,17 +77,18 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
     })
 }
 
-/// Threads to read with, one per core.
+/// Creates a thread pool with one thread per core.
 fn pool() -> Result<ThreadPool, String> {
     check_stack_space(cores()).map_err(|error| error.to_string())?;
     ThreadPoolBuilder::new().num_threads(cores()).build().map_err(|error| error.to_string())
 }
 
-/// Refuses a scene that `glimt check` would refuse. It reads the text that `glimt MODEL` shows, whose files are there.
+/// Rejects a scene that `glimt check` would reject. Checks the text that `glimt MODEL` renders, because its files
+/// exist.
 fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
     let shown = super::gltf::text(path, (Show::default(), &Naming::Inside), containers, token)?;
     let Err(errors) = load_generated(shown.text.into(), path, &[]) else { return Ok(()) };
-    // Files have other names where the scene is written.
+    // Ignore file names, which differ in the imported scene.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
     Err(AssetError::Malformed { path: path.to_owned(), line: None, reason: in_its_scene(first).message })

@@ -1,4 +1,4 @@
-//! `[textures]` and `[materials]` of a glTF file.
+//! The `[textures]` and `[materials]` tables of a converted glTF file.
 
 use std::collections::HashMap;
 
@@ -8,50 +8,50 @@ use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, Slot, TextureRef, Te
 use crate::math::{DVec3, Vec2};
 use crate::scene::quoted;
 
-/// The files of images.
+/// Access to the text and to image files while materials are written.
 pub(super) trait Files {
-    /// The text.
+    /// The scene text.
     fn toml(&mut self) -> &mut Toml;
-    /// Name of an image.
+    /// Name of an image, without an extension.
     fn image_name(&self, image: usize) -> String;
-    /// The file of an image.
+    /// The file that contains an image.
     fn image(&mut self, image: usize) -> TextureFile;
 }
 
-/// The file of a texture.
+/// File of a texture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TextureFile {
-    /// The path that the text has.
+    /// Path as written in the scene.
     pub(super) file: String,
-    /// Number of the image in a glTF file.
+    /// Index of the image in a glTF file.
     pub(super) image: Option<usize>,
 }
 
-/// Use of a texture's numbers, which is one for each table.
+/// How a texture's values are used; each use gets its own table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Reading {
+enum TextureUse {
     Colors,
     Numbers,
     Normals,
 }
 
-/// Keys of a table with their values.
-type Keys = Vec<(&'static str, String)>;
+/// Keys and values of a table.
+type TableKeys = Vec<(&'static str, String)>;
 
-/// Identity of a texture: image, use, and the other keys of its table.
-type Identity = (usize, Reading, String);
+/// What identifies a texture: image, use, and the other keys of its table.
+type TextureIdentity = (usize, TextureUse, String);
 
-/// Materials and their textures.
-pub(super) struct Materials<'a, F> {
+/// Writer of materials and their textures.
+pub(super) struct MaterialWriter<'a, F> {
     files: &'a mut F,
-    textures: HashMap<Identity, String>,
+    textures: HashMap<TextureIdentity, String>,
     names: Unique,
 }
 
-impl<F: Files> Materials<'_, F> {
-    /// Writes the tables; returns the names of the materials.
+impl<F: Files> MaterialWriter<'_, F> {
+    /// Writes the tables and returns the names of the materials.
     pub(super) fn write(scene: &ModelScene, names: &mut Unique, files: &mut F) -> Vec<String> {
-        let mut all = Materials { files, textures: HashMap::new(), names: Unique::default() };
+        let mut all = MaterialWriter { files, textures: HashMap::new(), names: Unique::default() };
         scene
             .materials
             .iter()
@@ -64,8 +64,8 @@ impl<F: Files> Materials<'_, F> {
     }
 
     fn material(&mut self, material: &ModelMaterial, name: &str) {
-        // Collect the keys first: textures have tables of their own, which come before.
-        let mut keys = Keys::new();
+        // Collect the keys first: the tables of textures precede the material's table.
+        let mut keys = TableKeys::new();
         match material.glass {
             Some(glass) => {
                 keys.push(("type", "\"glass\"".to_owned()));
@@ -85,7 +85,7 @@ impl<F: Files> Materials<'_, F> {
         keys.iter().for_each(|(key, value)| toml.key(key, value));
     }
 
-    fn principled(&mut self, keys: &mut Keys, material: &ModelMaterial) {
+    fn principled(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
         keys.push(("type", "\"principled\"".to_owned()));
         self.color(keys, ("color", 0.8), &material.color);
         self.number(keys, ("metallic", 0.0), &material.metallic, "b");
@@ -99,13 +99,13 @@ impl<F: Files> Materials<'_, F> {
         }
     }
 
-    /// Adds the keys that every material may have.
-    fn surface(&mut self, keys: &mut Keys, material: &ModelMaterial) {
+    /// Adds the keys that all material types share.
+    fn surface(&mut self, keys: &mut TableKeys, material: &ModelMaterial) {
         let emission = &material.emission;
         if emission.factor != DVec3::ZERO {
             match &emission.texture {
                 Some(texture) => {
-                    let name = self.texture(texture, Reading::Colors, DVec3::ONE);
+                    let name = self.texture(texture, TextureUse::Colors, DVec3::ONE);
                     let scale = emission.factor;
                     let scale = if scale == DVec3::ONE {
                         String::new()
@@ -121,7 +121,7 @@ impl<F: Files> Materials<'_, F> {
             }
         }
         if let Some(normal) = &material.normal {
-            let name = self.texture(normal, Reading::Normals, DVec3::ONE);
+            let name = self.texture(normal, TextureUse::Normals, DVec3::ONE);
             keys.push(("normal_map", quoted(&name)));
             if material.normal_strength != 1.0 {
                 keys.push(("normal_strength", number(material.normal_strength)));
@@ -134,7 +134,7 @@ impl<F: Files> Materials<'_, F> {
             Alpha::Opaque => {}
             Alpha::Mask { value, cutoff } => {
                 self.opacity(keys, value, &material.color);
-                // A cutoff of 0 shows everything, as does any without an alpha below 1.
+                // A cutoff of 0 shows everything, as does any cutoff if alpha is always 1.
                 if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
                     keys.push(("opacity_cutoff", number(*cutoff)));
                 }
@@ -143,15 +143,18 @@ impl<F: Files> Materials<'_, F> {
         }
     }
 
-    /// The chance by the alpha of an image. A factor of 1 leaves it to the texture of the colour.
-    fn opacity(&mut self, keys: &mut Keys, value: &Slot, color: &Slot) {
+    /// Writes the opacity from an image's alpha. With a factor of 1, it shares the color's texture.
+    fn opacity(&mut self, keys: &mut TableKeys, value: &Slot, color: &Slot) {
         match &value.texture {
             Some(texture) => {
-                // Where both have no factor, one table serves the colour and its alpha.
+                // Without factors, one table serves both the color and its alpha.
                 let is_same = color.texture.as_ref() == Some(texture) && color.factor == DVec3::ONE;
-                let reading =
-                    if is_same && value.factor == DVec3::ONE { Reading::Colors } else { Reading::Numbers };
-                let name = self.texture(texture, reading, value.factor);
+                let use_ = if is_same && value.factor == DVec3::ONE {
+                    TextureUse::Colors
+                } else {
+                    TextureUse::Numbers
+                };
+                let name = self.texture(texture, use_, value.factor);
                 keys.push(("opacity", format!("{{ texture = {}, channel = \"a\" }}", quoted(&name))));
             }
             None if value.factor != DVec3::ONE => keys.push(("opacity", number(value.factor.x))),
@@ -159,10 +162,10 @@ impl<F: Files> Materials<'_, F> {
         }
     }
 
-    fn color(&mut self, keys: &mut Keys, (key, usual): (&'static str, f64), slot: &Slot) {
+    fn color(&mut self, keys: &mut TableKeys, (key, usual): (&'static str, f64), slot: &Slot) {
         match &slot.texture {
             Some(texture) => {
-                let name = self.texture(texture, Reading::Colors, slot.factor);
+                let name = self.texture(texture, TextureUse::Colors, slot.factor);
                 keys.push((key, format!("{{ texture = {} }}", quoted(&name))));
             }
             None if slot.factor != DVec3::splat(usual) => {
@@ -173,10 +176,16 @@ impl<F: Files> Materials<'_, F> {
         }
     }
 
-    fn number(&mut self, keys: &mut Keys, (key, usual): (&'static str, f64), slot: &Slot, channel: &str) {
+    fn number(
+        &mut self,
+        keys: &mut TableKeys,
+        (key, usual): (&'static str, f64),
+        slot: &Slot,
+        channel: &str,
+    ) {
         match &slot.texture {
             Some(texture) => {
-                let name = self.texture(texture, Reading::Numbers, slot.factor);
+                let name = self.texture(texture, TextureUse::Numbers, slot.factor);
                 keys.push((key, format!("{{ texture = {}, channel = \"{channel}\" }}", quoted(&name))));
             }
             None if slot.factor.x != usual => keys.push((key, number(slot.factor.x))),
@@ -184,9 +193,9 @@ impl<F: Files> Materials<'_, F> {
         }
     }
 
-    /// Name of a texture, whose table is written if it is new.
-    fn texture(&mut self, texture: &TextureRef, reading: Reading, factor: DVec3) -> String {
-        let mut keys = Keys::new();
+    /// Returns the name of a texture, and writes its table if it is new.
+    fn texture(&mut self, texture: &TextureRef, use_: TextureUse, factor: DVec3) -> String {
+        let mut keys = TableKeys::new();
         if texture.is_nearest {
             keys.push(("filter", "\"nearest\"".to_owned()));
         }
@@ -211,7 +220,7 @@ impl<F: Files> Materials<'_, F> {
             keys.push(("factor", color(factor)));
         }
         let shared = keys.iter().map(|(key, value)| format!("{key}={value};")).collect();
-        let identity = (texture.image, reading, shared);
+        let identity = (texture.image, use_, shared);
         if let Some(known) = self.textures.get(&identity) {
             return known.clone();
         }

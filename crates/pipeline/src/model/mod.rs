@@ -1,5 +1,5 @@
-//! Scenes of models: the text of a scene that shows a mesh or a glTF file. `glimt MODEL` reads this text as it reads that of a
-//! scene file, `glimt import` writes it; so both show the same.
+//! Scene text generated for a mesh or a glTF file. `glimt MODEL` renders the text that `glimt import` writes, so both
+//! show the same image.
 
 mod frame;
 mod gltf;
@@ -11,8 +11,8 @@ mod toml;
 use std::collections::HashSet;
 use std::path::Path;
 
-use self::frame::{Eye, FOV, KEY, SKY, ground_reflectance, key_direction};
-use self::gltf::{Asset, Naming};
+use self::frame::{CameraPose, FOV, KEY, SKY, ground_reflectance, key_direction};
+use self::gltf::{ExportedFile, Naming};
 use self::toml::{Toml, exact_vector, number, rounded, vector};
 use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
@@ -23,20 +23,20 @@ use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 
-/// Way of showing a model.
+/// How to show a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Show {
-    /// The side from which it is seen. `None` for the file's own camera, else [`Side::Iso`].
+    /// Side that faces the camera. `None` uses the file's own camera, or [`Side::Iso`] if it has none.
     pub(crate) from: Option<Side>,
-    /// Width over height of the picture. `None` if the call leaves one of them open.
+    /// Aspect ratio of the image. `None` if the command line sets neither width nor height.
     pub(crate) aspect: Option<f64>,
-    /// The axis of a mesh file that points upwards. `None` for the usual one of its format.
+    /// Up axis of a mesh file. `None` uses the default of its format.
     pub(crate) up: Option<UpAxis>,
-    /// Pictures of a turntable, in all of which the model is to be seen. 1 for a single picture.
+    /// Number of turntable frames, which must all contain the model. 1 for a still image.
     pub(crate) turns: u32,
 }
 
-/// Width and height of a picture where nobody says another.
+/// Default width and height of the image.
 const SIZE: [f64; 2] = [640.0, 480.0];
 
 impl Default for Show {
@@ -46,7 +46,7 @@ impl Default for Show {
 }
 
 impl Show {
-    /// The way that a call asks for.
+    /// Returns the view that the command line requests.
     pub(crate) fn of(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
             (None, None) => None,
@@ -63,7 +63,7 @@ impl Show {
         }
     }
 
-    /// Adds what the scene of a model depends on.
+    /// Adds all fields to a fingerprint.
     pub(crate) fn add_to(self, key: &mut Fingerprint) {
         key.flag(self.from.is_some());
         if let Some(from) = self.from {
@@ -77,25 +77,25 @@ impl Show {
     }
 }
 
-/// The scene of a model.
+/// Scene text of a model and the files it depends on.
 #[derive(Debug)]
 pub(crate) struct ModelText {
     /// The text of the scene.
     pub(crate) text: String,
     /// Hash of the model's file.
     pub(crate) hash: FileHash,
-    /// Other files that it was made of.
+    /// Other files that the text depends on.
     pub(crate) companions: Vec<Companion>,
-    /// Approximations, a line each.
+    /// Approximations, one message each.
     pub(crate) notes: Vec<String>,
-    /// Files that the text names beside itself and that are not there yet.
-    pub(crate) assets: Vec<Asset>,
+    /// Files that the text references and that do not exist yet.
+    pub(crate) assets: Vec<ExportedFile>,
 }
 
-/// The scene that shows a model, with paths relative to the model's folder.
+/// Generates the scene that shows a model, with paths relative to the model's folder.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// The file cannot be read or is invalid.
 pub(crate) fn text(
     path: &Path,
     show: Show,
@@ -104,7 +104,7 @@ pub(crate) fn text(
 ) -> Result<ModelText, AssetError> {
     if is_gltf(path) {
         if show.up.is_some_and(|up| up != UpAxis::Y) {
-            let reason = "y is up in glTF files: --up is for obj, off, ply, stl".to_owned();
+            let reason = "glTF files are always y-up; `--up` applies to obj, off, ply and stl".to_owned();
             return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
         }
         return gltf::text(path, (show, &Naming::Inside), containers, token);
@@ -112,64 +112,61 @@ pub(crate) fn text(
     plain::text(path, show, containers, token)
 }
 
-/// The note about a model that leaves no trace in its picture.
-const UNSEEN: &str = "nothing of it is seen: its faces have an opacity of 0";
-
-/// A mistake in the scene of a model, which is in no file.
-pub(crate) fn in_its_scene(one: Diagnostic) -> Diagnostic {
-    Diagnostic { message: format!("in the scene of this model, {}", one.message), ..one }
+/// ReportMarks a diagnostic as one of the generated scene, which exists in no file.
+pub(crate) fn in_its_scene(diagnostic: Diagnostic) -> Diagnostic {
+    Diagnostic { message: format!("in the scene of this model, {}", diagnostic.message), ..diagnostic }
 }
 
-/// Name of a file in its folder.
+/// Returns the last component of a path.
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Most radiance that a path brings by one vertex after its first reflection, in scenes of polished surfaces: few samples would show
-/// the key light by way of these as bright dots. Four times the radiance of the sky.
+/// Limit on indirect radiance per bounce in scenes with polished surfaces, where few samples would show the key light's
+/// caustics as fireflies. Four times the sky's radiance.
 const CLAMP: &str = "2";
-/// Roughness from which on surfaces throw no bright dots on others: at 0.4, the clamp changes the error at 64 samples by a quarter,
-/// at 0.2 tenfold.
+/// Roughness above which surfaces cause no fireflies. At 0.4 the clamp changes the error at 64 samples by a quarter, at
+/// 0.2 tenfold.
 const ROUGH: f64 = 0.3;
-/// The exponent of a Phong highlight as narrow as one of that roughness: 2/α² − 2 with α = roughness².
+/// Exponent of a Phong highlight as narrow as a GGX lobe of roughness [`ROUGH`]: 2/α² − 2 with α = roughness².
 const NARROW: f32 = 245.0;
 
-/// The light of a model.
+/// Lighting of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Lighting {
-    /// A sky and a key light.
-    Ours {
+    /// A default sky and key light.
+    Default {
         /// Whether any surface is polished.
         is_polished: bool,
     },
-    /// The lights of the file, with a sky that is as bright to them as ours to the key light.
-    Own {
-        /// Stops by which the picture is darker than the lights make it, at most 0.
+    /// The lights of the file, with a sky that has the default ratio to them.
+    FromFile {
+        /// Exposure in stops that compensates for bright lights, at most 0.
         exposure: f64,
     },
 }
 
 impl Lighting {
-    /// Lights that bring so much irradiance to the model.
-    fn own(irradiance: f64) -> Self {
-        // A white surface is then as bright as under our lights.
+    /// Lighting for lights of the file that cause this irradiance on the model.
+    fn from_file(irradiance: f64) -> Self {
+        // At this irradiance a white surface is as bright as under the default lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
-        // The sky stays within what a scene may have, however near a light is.
+        // Keep the sky's radiance valid, however close a light is.
         const MOST: f64 = 40.0;
-        Self::Own { exposure: -(libm::log2(over).min(MOST) * 10.0).round() / 10.0 }
+        Self::FromFile { exposure: -(libm::log2(over).min(MOST) * 10.0).round() / 10.0 }
     }
 
     /// Radiance of the sky.
     fn sky(self) -> f64 {
         match self {
-            Self::Ours { .. } => SKY,
-            Self::Own { exposure } => rounded(SKY * libm::exp2(-exposure), 3),
+            Self::Default { .. } => SKY,
+            Self::FromFile { exposure } => rounded(SKY * libm::exp2(-exposure), 3),
         }
     }
 }
 
-/// Tables that are the same for every model: the picture, then what is around it.
+/// Writes the `[render]` table.
 fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
     toml.table("[render]");
     if let Some([width, height]) = size {
@@ -180,15 +177,15 @@ fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
     toml.key("error", "0.05");
     toml.key("integrator", "\"path\"");
     match light {
-        Lighting::Ours { is_polished: true } => toml.key("clamp", CLAMP),
-        Lighting::Ours { is_polished: false } => {}
-        Lighting::Own { exposure } if exposure != 0.0 => toml.key("exposure", number(exposure)),
-        Lighting::Own { .. } => {}
+        Lighting::Default { is_polished: true } => toml.key("clamp", CLAMP),
+        Lighting::Default { is_polished: false } => {}
+        Lighting::FromFile { exposure } if exposure != 0.0 => toml.key("exposure", number(exposure)),
+        Lighting::FromFile { .. } => {}
     }
 }
 
-/// The camera that frames the model.
-fn camera(toml: &mut Toml, eye: &Eye, fov: f64) {
+/// Writes the `[camera]` table.
+fn camera(toml: &mut Toml, eye: &CameraPose, fov: f64) {
     toml.table("[camera]");
     toml.key("position", exact_vector(eye.position));
     toml.key("look_at", exact_vector(eye.look_at));
@@ -200,11 +197,11 @@ fn camera(toml: &mut Toml, eye: &Eye, fov: f64) {
     }
 }
 
-/// A sky, and a key light where the model has no lights of its own.
-fn light(toml: &mut Toml, eye: &Eye, light: Lighting) {
+/// Writes a sky, and a key light if the model has no lights of its own.
+fn light(toml: &mut Toml, eye: &CameraPose, light: Lighting) {
     toml.table("[environment]");
     toml.key("color", number(light.sky()));
-    if matches!(light, Lighting::Ours { .. }) {
+    if matches!(light, Lighting::Default { .. }) {
         toml.table("[[light]]");
         toml.key("type", "\"directional\"");
         toml.key("direction", vector(key_direction(eye)));
@@ -213,8 +210,8 @@ fn light(toml: &mut Toml, eye: &Eye, light: Lighting) {
     }
 }
 
-/// A ground below the model, unless the eye is below it.
-fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], eye: &Eye) {
+/// Writes a ground plane below the model, unless the camera is below it.
+fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], eye: &CameraPose) {
     let size = (greatest - least).length();
     let height = least.y - size * 1e-4;
     if eye.position.y <= height {
@@ -228,12 +225,12 @@ fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], ey
     toml.key("material", format!("\"{name}\""));
 }
 
-/// Names in use.
+/// Set of unique names.
 #[derive(Debug, Default)]
 struct Unique(HashSet<String>);
 
 impl Unique {
-    /// A name that is not in use yet: this one, or with a number. One without letters becomes `usual` with a number.
+    /// Returns `wanted`, with a number appended if it is in use. An empty or numeric name is replaced by `usual`.
     fn name(&mut self, wanted: &str, usual: &str) -> String {
         let plain: String = wanted.chars().filter(|c| !c.is_control()).take(100).collect();
         let plain = plain.trim();

@@ -1,4 +1,4 @@
-//! Scenes of mesh files without a scene of their own: OBJ, OFF, PLY, STL.
+//! Conversion of mesh files (OBJ, OFF, PLY, STL) to scene text.
 
 use std::fs::File;
 use std::io::Read;
@@ -7,26 +7,25 @@ use std::path::Path;
 use super::frame::framed;
 use super::toml::Toml;
 use super::{
-    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
-    render,
+    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
 };
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
+use crate::messages::INVISIBLE_MODEL;
 use crate::scene::quoted;
 use crate::settings::{Side, UpAxis};
 use crate::stages::containers::Containers;
 use crate::world::file_is_glass;
 
-/// The axis that points upwards where the call does not say it: z in STL files, as programs for construction and printing have
-/// it, and in PLY files by Blender; else y.
+/// Default up axis of a format: z for STL, as in CAD and 3D printing, and for PLY files from Blender; y otherwise.
 fn usual_up(path: &Path) -> UpAxis {
     let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
     if has("stl") || has("ply") && is_by_blender(path) { UpAxis::Z } else { UpAxis::Y }
 }
 
-/// Whether the header of a PLY file names Blender, which leaves its axes as they are.
+/// Whether the header of a PLY file names Blender, which exports its z-up axes unchanged.
 fn is_by_blender(path: &Path) -> bool {
     const START: usize = 256;
     let mut start = [0; START];
@@ -38,7 +37,7 @@ fn is_by_blender(path: &Path) -> bool {
 }
 
 impl UpAxis {
-    /// Degrees about x, y and z that turn the axis upwards. `None` if it is already.
+    /// Euler angles in degrees that turn this axis to y. `None` for y itself.
     fn rotation(self) -> Option<[i32; 3]> {
         match self {
             Self::X => Some([0, 0, 90]),
@@ -47,7 +46,7 @@ impl UpAxis {
         }
     }
 
-    /// A point after this rotation.
+    /// Applies [`rotation`](Self::rotation) to a point.
     fn upright(self, at: DVec3) -> DVec3 {
         match self {
             Self::X => DVec3::new(-at.y, at.x, at.z),
@@ -57,7 +56,7 @@ impl UpAxis {
     }
 }
 
-/// Whether a material of a mesh file may throw light on others as a mirror does.
+/// Whether a material of a mesh file may cast caustics.
 fn is_polished(material: &FileMaterial) -> bool {
     let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
     match &material.physical {
@@ -73,7 +72,7 @@ fn is_polished(material: &FileMaterial) -> bool {
     }
 }
 
-/// Whether every face has a material that lets all light pass.
+/// Whether every face is fully transparent.
 fn is_unseen(loaded: &LoadedMesh) -> bool {
     let is_clear =
         |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !file_is_glass(own);
@@ -81,7 +80,7 @@ fn is_unseen(loaded: &LoadedMesh) -> bool {
     !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_unseen)
 }
 
-/// The scene of a mesh file.
+/// Generates the scene of a mesh file.
 pub(super) fn text(
     path: &Path,
     show: Show,
@@ -107,18 +106,18 @@ pub(super) fn text(
         (show.from.unwrap_or(Side::Iso), show.turns),
         show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
-    // Name the coordinates of the file, not those of a camera that nobody wrote.
+    // Report the coordinates of the file, because the user did not write the camera's.
     let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
     if eye_reach >= LARGEST {
         let farthest = least.abs().max(greatest.abs()).max_element() as f32;
         let reason = format!(
-            "its coordinates reach to {farthest:e}, so that its camera would reach to {eye_reach:.0e}: it must stay below {LARGEST:e}"
+            "its coordinates reach to {farthest:e}, which puts its camera at {eye_reach:.0e}; coordinates must stay below {LARGEST:e}"
         );
         return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
     }
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
-    let lighting = Lighting::Ours { is_polished: loaded.materials.iter().any(is_polished) };
+    let lighting = Lighting::Default { is_polished: loaded.materials.iter().any(is_polished) };
     render(&mut toml, None, lighting);
     camera(&mut toml, &eye, FOV);
     light(&mut toml, &eye, lighting);
@@ -135,7 +134,7 @@ pub(super) fn text(
     if let Some([x, y, z]) = up.rotation() {
         toml.key("rotate", format!("[{x}, {y}, {z}]"));
     }
-    // Facets have no normals, and edges of parts are sharp.
+    // STL has no normals, and mechanical parts have sharp edges.
     let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
     if is_stl || loaded.is_faceted() {
         toml.key("smooth", "false");
@@ -147,9 +146,9 @@ pub(super) fn text(
         toml.key("vertex_colors", "true");
     }
     ground(&mut toml, &mut names, bounds, &eye);
-    // The scene gives the mesh another material where the file's own are missing, and would say nothing of that.
+    // The scene's own material hides missing materials of the file, so report them here.
     let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
-    notes.extend(is_unseen(&loaded).then(|| UNSEEN.to_owned()));
+    notes.extend(is_unseen(&loaded).then(|| INVISIBLE_MODEL.to_owned()));
     let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
     containers.keep(path, loaded);
     Ok(ModelText { text: toml.finish(), hash, companions, notes, assets })
@@ -161,7 +160,7 @@ mod tests {
     use crate::math::transform::rotation_xyz;
 
     #[test]
-    fn an_axis_is_turned_upwards_by_the_rotation_that_the_scene_has() {
+    fn up_axis_matches_the_rotation_in_the_scene() {
         for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
             let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
             assert_eq!(up.upright(axis), DVec3::Y, "{up:?}");

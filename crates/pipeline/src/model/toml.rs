@@ -1,14 +1,14 @@
-//! The text of a scene as a person would write it: short numbers, bare keys, nothing that is the default.
+//! Writer of concise TOML: short numbers, bare keys, no default values.
 
 use crate::math::{DVec3, Vec2};
 use crate::scene::quoted;
 
-/// A growing text.
+/// TOML text under construction.
 #[derive(Debug, Default)]
 pub(super) struct Toml(String);
 
 impl Toml {
-    /// A comment of its own lines.
+    /// Adds a comment, wrapped to lines.
     pub(super) fn comment(&mut self, text: &str) {
         const WIDTH: usize = 110;
         let mut line = String::from("#");
@@ -23,7 +23,7 @@ impl Toml {
         self.line(&line);
     }
 
-    /// An empty line, then a header such as `[camera]`.
+    /// Adds an empty line and a header such as `[camera]`.
     pub(super) fn table(&mut self, header: &str) {
         if !self.0.is_empty() && !self.0.ends_with("\n\n") {
             self.0.push('\n');
@@ -31,7 +31,7 @@ impl Toml {
         self.line(header);
     }
 
-    /// An empty line, then a comment.
+    /// Adds an empty line and a comment.
     pub(super) fn section(&mut self, text: &str) {
         if !self.0.is_empty() && !self.0.ends_with("\n\n") {
             self.0.push('\n');
@@ -39,7 +39,7 @@ impl Toml {
         self.comment(text);
     }
 
-    /// A key with a value that is TOML.
+    /// Adds a key with a value that is already TOML.
     pub(super) fn key(&mut self, key: &str, value: impl AsRef<str>) {
         self.line(&format!("{key} = {}", value.as_ref()));
     }
@@ -54,7 +54,7 @@ impl Toml {
     }
 }
 
-/// A number with as many digits as a 32-bit float holds; lengths far from 0 keep all of theirs.
+/// Formats a number with the precision of a 32-bit float; coordinates of 10,000 and more keep all digits.
 pub(super) fn number(value: f64) -> String {
     const FAR: f64 = 1e4;
     let magnitude = value.abs();
@@ -68,7 +68,7 @@ pub(super) fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text }
 }
 
-/// A point with all of its digits: a small model may be far from the origin.
+/// Formats a point with all digits, because a small model may be far from the origin.
 pub(super) fn exact_vector(value: DVec3) -> String {
     let exact = |value: f64| match value.abs() {
         0.0 => "0".to_owned(),
@@ -78,7 +78,7 @@ pub(super) fn exact_vector(value: DVec3) -> String {
     format!("[{}]", value.to_array().map(exact).join(", "))
 }
 
-/// A number with some significant digits.
+/// Rounds to `digits` significant digits.
 pub(super) fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -87,28 +87,28 @@ pub(super) fn rounded(value: f64, digits: i32) -> f64 {
     (value * unit).round() / unit
 }
 
-/// Numbers in brackets.
+/// Formats an array.
 pub(super) fn list(values: &[f64]) -> String {
     format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// A point or a direction.
+/// Formats a point or a direction.
 pub(super) fn vector(value: DVec3) -> String {
     list(&value.to_array())
 }
 
-/// Two numbers.
+/// Formats a pair of numbers.
 pub(super) fn pair(value: Vec2) -> String {
     list(&[f64::from(value.x), f64::from(value.y)])
 }
 
-/// A colour; grey is one number.
+/// Formats a color; gray is a single number.
 pub(super) fn color(value: DVec3) -> String {
     let [red, green, blue] = value.to_array();
     if red == green && green == blue { number(red) } else { vector(value) }
 }
 
-/// A name as a key: bare where TOML allows that.
+/// Formats a name as a key, without quotes where TOML allows it.
 pub(super) fn key_name(name: &str) -> String {
     let is_bare =
         !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_and_toml() {
+    fn numbers_are_short_toml() {
         for (value, text) in [
             (0.0, "0"),
             (-0.0, "0"),
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_comment_stays_one() {
+    fn comments_stay_comments() {
         let mut toml = Toml::default();
         toml.comment(&format!("a\n[camera]\u{7} {}", "word ".repeat(40)));
         let text = toml.finish();

@@ -1,29 +1,29 @@
-//! The stages of a request, and what each did.
+//! Stages of a request and their results.
 
-/// The stages, in their order.
+/// A stage of a request, in the order in which they run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
-    /// Reading and validating the scene file.
+    /// Read and validate the scene file.
     Parse,
-    /// Reading mesh files.
+    /// Load mesh files.
     Meshes,
-    /// Reading textures.
+    /// Load textures.
     Textures,
-    /// Building trees.
+    /// Build acceleration structures.
     Accel,
-    /// Gathering the lights.
+    /// Collect the lights.
     Lights,
-    /// Shooting photons.
+    /// Trace photons.
     Photons,
-    /// Tracing.
+    /// Trace camera rays.
     Render,
-    /// Encoding and writing pictures.
+    /// Encode and write images.
     Write,
 }
 
 impl Stage {
-    /// All of them, in order.
+    /// All stages in order.
     pub const ALL: [Self; 8] = [
         Self::Parse,
         Self::Meshes,
@@ -35,7 +35,7 @@ impl Stage {
         Self::Write,
     ];
 
-    /// Its name in reports and on the screen.
+    /// Name of the stage in reports and on the screen.
     pub fn name(self) -> &'static str {
         match self {
             Self::Parse => "parse",
@@ -54,17 +54,17 @@ impl Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Status {
-    /// At work. Never in a finished report.
+    /// In progress; never in a finished report.
     Running,
-    /// Done in this request.
+    /// Run by this request.
     Done,
-    /// Its inputs did not change.
+    /// Not run, because its inputs are unchanged.
     Reused,
-    /// This scene does not need it.
+    /// Not needed for this scene.
     Skipped,
 }
 
-/// One line of the table of stages.
+/// Report of one stage.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct StageReport {
     /// The stage.
@@ -73,8 +73,8 @@ pub struct StageReport {
     pub status: Status,
     /// Wall-clock time of the stage.
     pub seconds: f64,
-    /// Processor time of all threads of the process during the stage.
+    /// CPU time of all threads of the process during the stage.
     pub processor_seconds: f64,
-    /// Why it was skipped or reused, or what it made, in a few words; may be empty.
+    /// Why the stage was skipped or reused, or a summary of its result. May be empty.
     pub why: String,
 }

@@ -1,21 +1,21 @@
-//! The films of the last settings: a toggle that is switched back finds its film again.
+//! Cache of recent films, so that toggling a setting back reuses its film.
 
 use super::film_state::FilmState;
 use crate::scene::fingerprint::Key;
 
-/// Memory for films that are not the current one.
+/// Maximum memory of films other than the current one.
 const MOST_KEPT_BYTES: u64 = 256 << 20;
 
-/// The current film and those before it.
+/// The current film and cached ones.
 #[derive(Debug)]
 pub(crate) struct FilmCache {
     current: Option<FilmState>,
-    /// The least recently used first.
+    /// Least recently used first.
     kept: Vec<FilmState>,
-    /// Key of a film that stays whatever room it takes.
+    /// Key of a film that is kept regardless of its size.
     pinned: Option<Key>,
     most_kept_bytes: u64,
-    /// Films that were made so far.
+    /// Number of films created.
     made: u64,
 }
 
@@ -34,33 +34,32 @@ impl FilmCache {
         self.current.as_mut()
     }
 
-    /// The film of this key.
+    /// Returns the film with this key.
     pub(crate) fn of(&self, key: Key) -> Option<&FilmState> {
-        self.kept.iter().chain(&self.current).find(|canvas| canvas.key == key)
+        self.kept.iter().chain(&self.current).find(|state| state.key == key)
     }
 
-    /// Keeps the film of this key from now on, and no longer the one that was pinned before.
+    /// Pins the film with this key, in place of the previously pinned one.
     pub(crate) fn pin(&mut self, key: Key) {
         self.pinned = Some(key);
     }
 
-    /// Pins no film from now on.
+    /// Unpins the pinned film.
     pub(crate) fn unpin(&mut self) {
         self.pinned = None;
     }
 
-    /// Drops films until the others fit into so many bytes, as films that are kept from now on must. The current film and the pinned
-    /// one do not count.
+    /// Limits the size of the cached films, apart from the current and the pinned one, and evicts films above the limit.
     pub(crate) fn limit(&mut self, bytes: u64) {
         self.most_kept_bytes = bytes.min(MOST_KEPT_BYTES);
         self.make_room(0);
     }
 
-    /// Makes the film of this key the current one, if it is kept and of use; else there is no current film. Keeps the film
-    /// before, if there is room.
+    /// Makes the film with this key current if it is cached and usable; otherwise there is no current film. Caches the
+    /// previous film if there is room.
     pub(crate) fn select(&mut self, key: Key, is_usable: impl FnOnce(&FilmState) -> bool) {
         if self.current.as_ref().is_none_or(|current| current.key != key) {
-            let kept = self.kept.iter().position(|canvas| canvas.key == key);
+            let kept = self.kept.iter().position(|state| state.key == key);
             let found = kept.map(|index| self.kept.remove(index));
             if let Some(before) = std::mem::replace(&mut self.current, found) {
                 self.keep(before);
@@ -69,64 +68,64 @@ impl FilmCache {
         self.current.take_if(|current| !is_usable(current));
     }
 
-    /// A film in the place of the current one. Where there is no memory for it beside those that are kept, they go.
+    /// Replaces the current film. If there is not enough memory, drops the cached films and tries again.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// Errors of `make`.
     pub(crate) fn put<E>(&mut self, make: impl Fn() -> Result<FilmState, E>) -> Result<&mut FilmState, E> {
         self.current = None;
-        let mut canvas = match make() {
+        let mut state = match make() {
             Err(_) if !self.kept.is_empty() => {
                 let pinned = self.pinned;
-                self.kept.retain(|canvas| pinned == Some(canvas.key));
+                self.kept.retain(|state| pinned == Some(state.key));
                 make()
             }
             made => made,
         }?;
         self.made += 1;
-        canvas.number = self.made;
-        Ok(self.current.insert(canvas))
+        state.number = self.made;
+        Ok(self.current.insert(state))
     }
 
-    /// Number of films.
+    /// Returns the number of films.
     pub(crate) fn count(&self) -> usize {
         self.kept.len() + usize::from(self.current.is_some())
     }
 
-    /// Bytes that all of them take.
+    /// Returns the memory size of all films in bytes.
     pub(crate) fn memory_bytes(&self) -> u64 {
         self.kept.iter().chain(&self.current).map(FilmState::memory_bytes).sum()
     }
 
-    /// One too large for the budget is dropped alone; the others make room for one that is not.
-    fn keep(&mut self, canvas: FilmState) {
-        let size = canvas.memory_bytes();
-        // A camera on its way would fill the memory with what nobody comes back to.
-        let is_left_behind = canvas.is_passing && !canvas.is_covered();
-        if !canvas.is_begun() {
+    /// Caches a film and evicts others for it. A film larger than the limit is dropped instead.
+    fn keep(&mut self, state: FilmState) {
+        let size = state.memory_bytes();
+        // Drop incomplete films of a moving camera, which would fill the cache and are never reused.
+        let is_left_behind = state.is_passing && !state.is_covered();
+        if !state.is_begun() {
             return;
         }
-        if !self.is_pinned(&canvas) {
+        if !self.is_pinned(&state) {
             if size > self.most_kept_bytes || is_left_behind {
                 return;
             }
             self.make_room(size);
         }
-        self.kept.push(canvas);
+        self.kept.push(state);
     }
 
-    fn is_pinned(&self, canvas: &FilmState) -> bool {
-        self.pinned == Some(canvas.key)
+    fn is_pinned(&self, state: &FilmState) -> bool {
+        self.pinned == Some(state.key)
     }
 
-    /// Drops the least recently used films until one of this size fits.
+    /// Drops the least recently used films until `size` fits.
     fn make_room(&mut self, size: u64) {
-        let is_counted = |canvas: &&FilmState| !self.is_pinned(canvas);
+        let is_counted = |state: &&FilmState| !self.is_pinned(state);
         let mut used: u64 = self.kept.iter().filter(is_counted).map(FilmState::memory_bytes).sum();
         let (pinned, most) = (self.pinned, self.most_kept_bytes);
-        self.kept.retain(|canvas| {
-            let is_dropped = used + size > most && pinned != Some(canvas.key);
-            used -= if is_dropped { canvas.memory_bytes() } else { 0 };
+        self.kept.retain(|state| {
+            let is_dropped = used + size > most && pinned != Some(state.key);
+            used -= if is_dropped { state.memory_bytes() } else { 0 };
             !is_dropped
         });
     }
@@ -146,21 +145,21 @@ mod tests {
         Fingerprint::new(name).finish()
     }
 
-    /// A film of 64×32 pixels, with samples.
-    fn canvas(name: &str) -> FilmState {
+    /// Creates a film of 64×32 pixels with samples.
+    fn state(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
-        let mut canvas =
+        let mut state =
             FilmState::new(key(name), &plan, u64::MAX, Convergence::Stratified, None).expect("a film");
-        canvas.done.fill([1; 2]);
-        canvas
+        state.done.fill([1; 2]);
+        state
     }
 
     fn films(names: &[&str], most_kept_bytes: u64) -> FilmCache {
         let mut films = FilmCache { most_kept_bytes, ..FilmCache::default() };
         for name in names {
             films.select(key(name), |_| true);
-            films.put(|| Ok::<_, ()>(canvas(name))).expect("a film");
+            films.put(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         films
     }
@@ -171,23 +170,23 @@ mod tests {
     }
 
     #[test]
-    fn the_least_recently_used_go_first() {
-        let room_for_two = 2 * canvas("a").memory_bytes();
+    fn least_recently_used_is_dropped_first() {
+        let room_for_two = 2 * state("a").memory_bytes();
         let mut films = films(&["a", "b", "c"], room_for_two);
         assert_eq!(films.count(), 3);
-        assert_eq!(films.memory_bytes(), 3 * canvas("a").memory_bytes());
-        assert!(finds(&mut films, "a"), "the oldest is there, and is now the newest");
-        assert!(!finds(&mut films, "d"), "never seen; a, b and c do not all fit beside it");
+        assert_eq!(films.memory_bytes(), 3 * state("a").memory_bytes());
+        assert!(finds(&mut films, "a"), "the oldest is cached, and now the newest");
+        assert!(!finds(&mut films, "d"), "new; a, b and c do not all fit");
         assert!(finds(&mut films, "a") && finds(&mut films, "c"));
         assert!(!finds(&mut films, "b"));
     }
 
     #[test]
-    fn a_film_beyond_the_budget_is_dropped_and_costs_the_others_nothing() {
-        let mut films = films(&["a", "b"], canvas("a").memory_bytes());
+    fn too_large_film_does_not_evict_others() {
+        let mut films = films(&["a", "b"], state("a").memory_bytes());
         films
             .put(|| {
-                let mut large = canvas("large");
+                let mut large = state("large");
                 large.base = Some(crate::film::RadianceImage::black(100, 100));
                 Ok::<_, ()>(large)
             })
@@ -197,34 +196,34 @@ mod tests {
     }
 
     #[test]
-    fn the_pinned_film_stays_whatever_room_it_takes() {
-        let mut films = films(&["own"], canvas("a").memory_bytes());
+    fn pinned_film_is_kept_regardless_of_size() {
+        let mut films = films(&["own"], state("a").memory_bytes());
         films.pin(key("own"));
         films.most_kept_bytes -= 1;
         for name in ["a", "b", "c"] {
             films.select(key(name), |_| true);
-            films.put(|| Ok::<_, ()>(canvas(name))).expect("a film");
+            films.put(|| Ok::<_, ()>(state(name))).expect("a film");
         }
         assert_eq!(films.count(), 2, "the pinned one and the current one");
         let tries = std::cell::Cell::new(0);
         let made = films.put(|| {
             tries.set(tries.get() + 1);
-            if tries.get() == 1 { Err("no memory") } else { Ok(canvas("d")) }
+            if tries.get() == 1 { Err("no memory") } else { Ok(state("d")) }
         });
         assert!(made.is_ok() && finds(&mut films, "own"));
-        // Another film is pinned: this one is as good as any.
+        // After pinning another film, this one is treated like any other.
         films.pin(key("other"));
         assert!(!finds(&mut films, "d"));
         assert!(!finds(&mut films, "own"));
     }
 
     #[test]
-    fn of_a_camera_on_its_way_only_whole_pictures_are_kept() {
+    fn moving_camera_keeps_only_complete_films() {
         for is_whole in [false, true] {
             let mut films = films(&["a"], u64::MAX);
             films.select(key("b"), |_| true);
             let passing = || {
-                let mut passing = canvas("b");
+                let mut passing = state("b");
                 passing.is_passing = true;
                 passing.done[0] = [u32::from(is_whole); 2];
                 Ok::<_, ()>(passing)
@@ -237,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_of_no_use_is_dropped_and_kept_films_make_room_for_a_new_one() {
+    fn cached_films_make_room_for_a_new_one() {
         let mut films = films(&["a", "b"], u64::MAX);
         films.select(key("a"), |_| false);
         assert!(films.current().is_none() && !finds(&mut films, "a") && finds(&mut films, "b"));
@@ -245,7 +244,7 @@ mod tests {
         let tries = std::cell::Cell::new(0);
         let made = films.put(|| {
             tries.set(tries.get() + 1);
-            if tries.get() == 1 { Err("no memory") } else { Ok(canvas("c")) }
+            if tries.get() == 1 { Err("no memory") } else { Ok(state("c")) }
         });
         assert!(made.is_ok());
         assert_eq!(films.count(), 1);

@@ -1,4 +1,4 @@
-//! A film with what it is of, and how far it is.
+//! A film with its cache key and render progress.
 
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -17,67 +17,67 @@ use crate::render::share::Share;
 use crate::scene::fingerprint::Key;
 use crate::trace::{Cost, Job};
 
-/// A film that is being rendered, or a finished one.
+/// A film with its cache key and render progress.
 #[derive(Debug)]
 pub(crate) struct FilmState {
     pub(crate) key: Key,
-    /// Number of the film among those of its cache.
+    /// Number of the film in its cache.
     pub(crate) number: u64,
     pub(crate) film: Arc<Film>,
-    /// Samples that both halves of each cell have; no more are to come for those without pixels.
+    /// Samples of both halves of each cell. [`u32::MAX`] for cells that get none.
     pub(crate) done: Vec<[u32; 2]>,
     /// Rays of each cell.
     pub(crate) rays: Vec<u64>,
-    /// Seconds of a processor that all of them took.
+    /// CPU seconds of all rays.
     pub(super) seconds: f64,
     /// Recent cost of the samples in each cell.
     costs: Vec<CellCost>,
-    /// Cost of a pixel in a job, beside its samples.
+    /// Cost of a pixel in a job, apart from its samples.
     pixel_share: PixelShare,
-    /// Samples that they are to have at most.
+    /// Maximum samples of both halves of each cell.
     pub(crate) goals: Goals,
-    /// Samples that halves without a goal are expected to get.
+    /// Expected samples of halves without a goal.
     expected: ExpectedSamples,
-    /// A first picture at the size of the preview, shown in pixels without samples.
+    /// First image at the size of the preview, shown for pixels without samples.
     pub(crate) base: Option<RadianceImage>,
     /// The previewer of the last preview.
     pub(crate) previewer: Option<Previewer>,
-    /// Whether it was begun for a camera on its way.
+    /// Whether the render began while the camera was moving.
     pub(crate) is_passing: bool,
-    /// The budget that ended the last render of it.
+    /// The time limit that ended the last render.
     pub(crate) ended_by: Option<f64>,
-    /// Seconds that it was rendered for, by all requests.
+    /// Render time of all requests in seconds.
     pub(crate) render_seconds: f64,
-    /// The share of a picture that it is. `None` for all of it.
+    /// The share of the image that is rendered. `None` for the whole image.
     pub(crate) share: Option<Share>,
-    /// Tiles of the share. `None` for all of them.
+    /// Which tiles belong to the share. `None` for all tiles.
     own: Option<Vec<bool>>,
     /// Work of the process whose checkpoint this render continues.
     pub(crate) before: Before,
-    /// Rays of all requests so far, with those of the process whose checkpoint this render continues.
+    /// Rays of all requests and of the process whose checkpoint this render continues.
     pub(crate) traced: RayCounters,
-    /// Whether a checkpoint has all its samples.
+    /// Whether a checkpoint contains all samples.
     pub(crate) is_kept: bool,
-    /// Names of all that the picture depends on. `None` before the first request for them.
+    /// Names and values of everything that the image depends on. `None` until first needed.
     pub(crate) identity: Option<Vec<Trait>>,
-    /// Whether it was read from a part that is finished.
+    /// Whether the film was read from a finished part.
     pub(crate) is_finished_part: bool,
 }
 
 /// Work of an earlier process.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Before {
-    /// Rays and look-ups.
+    /// Rays and texture lookups.
     pub(crate) rays: RayCounters,
-    /// Seconds of its render stage.
+    /// Seconds of the render stage.
     pub(crate) seconds: f64,
 }
 
 impl FilmState {
-    /// Without samples; its film may take `most_bytes`, and its noise falls so.
+    /// Creates a state without samples. The film may use `most_bytes`.
     ///
     /// # Errors
-    /// There is no memory for the film.
+    /// Not enough memory for the film.
     pub(crate) fn new(
         key: Key,
         plan: &Plan,
@@ -126,12 +126,12 @@ impl FilmState {
         })
     }
 
-    /// Whether a tile is to be rendered here.
+    /// Whether this process renders a tile.
     fn is_own(&self, tile: usize) -> bool {
         self.own.as_ref().is_none_or(|own| own[tile])
     }
 
-    /// Numbers in the whole picture of the first of these samples, as many as follow each other there.
+    /// Returns the sample indices in the whole image of the first of these samples that are consecutive there.
     pub(crate) fn numbers(&self, samples: Range<u32>) -> Range<u32> {
         match &self.share {
             Some(share) => share.numbers(samples),
@@ -139,12 +139,12 @@ impl FilmState {
         }
     }
 
-    /// Goals of a film that is to have as many samples as this one.
+    /// Returns goals equal to the samples of this film.
     pub(super) fn goals_of_what_is_done(&self) -> Goals {
         Goals { decided: self.done.clone(), ..Goals::none(self.done.len()) }
     }
 
-    /// Takes over how many samples the film has in each half of a cell.
+    /// Updates the sample counts from the film.
     pub(super) fn count_again(&mut self) {
         let halves: Vec<_> = self.halves().collect();
         for (cell, half) in halves {
@@ -152,35 +152,35 @@ impl FilmState {
         }
     }
 
-    /// Whether every pixel has this many samples, or those that it is to have.
+    /// Whether every pixel has this many samples or has reached its goal.
     pub(crate) fn is_complete(&self, samples: u32) -> bool {
         self.is_complete_in(None, samples)
     }
 
-    /// Whether every pixel in the tiles of a part has this many samples, or all that it is to have. `None` means all tiles.
+    /// Whether every pixel in the tiles of `part` has this many samples or has reached its goal. `None` for all tiles.
     pub(crate) fn is_complete_in(&self, part: Option<Rect>, samples: u32) -> bool {
         self.halves()
             .filter(|(cell, _)| self.is_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
     }
 
-    /// Whether the image of a plan has all its samples: as many as it is to have, or as many as its time was enough for.
+    /// Whether a plan's image is finished: all samples are done or the time limit was reached.
     pub(crate) fn is_finished(&self, plan: &Plan) -> bool {
         let is_over_time = plan.time_seconds.is_some() && self.ended_by == plan.time_seconds;
         self.is_finished_part || is_over_time || self.is_complete(plan.settings.render.samples)
     }
 
-    /// Whether no pixel has more samples than these.
+    /// Whether no pixel has more than this many samples.
     pub(crate) fn has_at_most(&self, samples: u32) -> bool {
         self.halves().all(|(cell, half)| self.done[cell][half] <= samples)
     }
 
-    /// Samples that every pixel has which is to have more, up to some.
+    /// Returns the smallest number of samples of a pixel that needs more, at most `most`.
     pub(crate) fn samples(&self, most: u32) -> u32 {
         self.samples_in(None, most)
     }
 
-    /// Fewest samples of a pixel that is to have more, in the tiles of a part, at most `most`. `None` means all tiles.
+    /// Like [`Self::samples`], in the tiles of `part`. `None` for all tiles.
     pub(crate) fn samples_in(&self, part: Option<Rect>, most: u32) -> u32 {
         let of = |(tile, half): (usize, usize)| {
             let done = self.done[tile][half];
@@ -189,19 +189,19 @@ impl FilmState {
         self.halves().filter(|(cell, _)| self.is_in(part, *cell)).filter_map(of).min().unwrap_or(most)
     }
 
-    /// Whether the tile of a cell has pixels in a part.
+    /// Whether the tile of a cell overlaps `part`.
     fn is_in(&self, part: Option<Rect>, cell: usize) -> bool {
         part.is_none_or(|part| {
             self.film.tile_rect(cell / CELLS).is_some_and(|rect| rect.intersection(&part).is_some())
         })
     }
 
-    /// Whether there are samples.
+    /// Whether any pixel has samples.
     pub(crate) fn is_begun(&self) -> bool {
         self.halves().any(|(cell, half)| self.done[cell][half] > 0)
     }
 
-    /// Whether no pixel is without a sample, so that the picture may take the place of another one.
+    /// Whether every pixel has a sample, so that the image may replace another one.
     pub(crate) fn is_covered(&self) -> bool {
         self.halves().all(|(cell, half)| self.done[cell][half] > 0)
     }
@@ -212,7 +212,7 @@ impl FilmState {
             .filter(|(cell, half)| self.is_own(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0)
     }
 
-    /// Bytes that it takes.
+    /// Returns the memory size in bytes.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let base = self.base.as_ref().map_or(0, |base| size_of_val(base.pixels.as_slice()) as u64);
         let cells = size_of_val(self.done.as_slice())
@@ -226,8 +226,8 @@ impl FilmState {
             + self.previewer.as_ref().map_or(0, Previewer::memory_bytes)
     }
 
-    /// Jobs that bring both halves of every cell to `target` or to their goals, in the tiles of a part (`None`: in all of them).
-    /// Tiles whose cells all lack the same samples are one job. The order is the film's.
+    /// Returns the jobs that bring both halves of every cell in `part` (`None` for all) to `target` or their goals.
+    /// Tiles whose cells need the same samples are one job. Jobs are in the order of the film.
     pub(crate) fn jobs(&self, part: Option<Rect>, target: impl Fn(usize, usize) -> u32) -> Vec<Job> {
         let missing = |cell: usize, half: usize| {
             self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
@@ -254,12 +254,12 @@ impl FilmState {
             }
         }
         jobs.retain(|job| !job.samples.is_empty());
-        // The longest first, so that all threads end at about the same time.
+        // Run the longest jobs first, so that all threads end at about the same time.
         jobs.sort_by_key(|job| Reverse(job.samples.len()));
         jobs
     }
 
-    /// Note that a job is done, and what it took; pixels times samples that it was.
+    /// Records a finished job and its cost. Returns its pixels times samples.
     pub(crate) fn note(&mut self, job: &Job, cost: &Cost) -> u64 {
         let (rays, seconds) = (cost.rays.all(), cost.seconds / job.pixels.rect.area() as f64);
         for cell in CELLS * job.tile..CELLS * (job.tile + 1) {
@@ -286,29 +286,29 @@ impl FilmState {
         }
     }
 
-    /// Tiles whose samples ended before their noise was below the error asked for, and the noise of the worst.
+    /// Returns the number of tiles that reached the sample limit above the noise target, and the noise of the worst.
     pub(crate) fn missed(&self, error: f64) -> Option<(usize, f64)> {
         self.goals.missed(&self.film, error)
     }
 
-    /// Pixels times samples that there are.
+    /// Returns the pixels times samples rendered so far.
     pub(crate) fn units(&self) -> u64 {
         self.units_of(|tile, half| self.done[tile][half])
     }
 
-    /// Pixels times samples that there will be, as far as that is known, of some at most.
+    /// Returns the expected total of pixels times samples, with at most `most` samples.
     pub(crate) fn units_to_come(&self, most: u32) -> u64 {
         self.units_of(|cell, half| self.to_come(cell, half, most))
     }
 
-    /// Seconds of a processor that it took.
+    /// Returns the CPU seconds spent so far.
     pub(crate) fn seconds(&self) -> f64 {
         self.seconds
     }
 
-    /// Expected processor seconds of the samples to come, at most to `most`. `jobs` is the number of jobs in which a pixel gets
-    /// from some samples to others. The cost of a sample is that of the last ones in its cell; cells without samples take the
-    /// mean.
+    /// Returns the expected CPU seconds of the remaining samples, up to `most`. `jobs` returns the number of jobs
+    /// between two sample counts. A sample costs as much as recent ones in its cell, or the mean in cells without
+    /// samples.
     pub(crate) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
         let is_there = |cell: &usize| self.is_own(cell / CELLS) && self.film.cell_rect(*cell).is_some();
@@ -329,11 +329,12 @@ impl FilmState {
             known += cost.seconds();
             worth += of_cell;
         }
-        // Before anything is known all samples are alike.
+        // Without measurements, all samples cost the same.
         seconds + others * if worth > 0.0 { known / worth } else { 1.0 }
     }
 
-    /// Samples of the pixel with most samples: now, and expected in the end. There are as many passes of photons.
+    /// Returns the current and the expected final samples of the pixel with most samples, which are also the numbers of
+    /// photon passes.
     pub(crate) fn passes(&self, most: u32) -> [u32; 2] {
         let most_of = |samples: &dyn Fn(usize, usize) -> u32| {
             self.halves().map(|(cell, half)| samples(cell, half)).max().unwrap_or(0)
@@ -341,7 +342,7 @@ impl FilmState {
         [most_of(&|cell, half| self.done[cell][half]), most_of(&|cell, half| self.to_come(cell, half, most))]
     }
 
-    /// Whether it is known about how many samples there will be, where noise decides that.
+    /// Whether the final number of samples can be estimated if noise ends the render.
     pub(crate) fn is_foreseen(&self) -> bool {
         self.halves().all(|(cell, half)| self.to_come(cell, half, u32::MAX) < u32::MAX)
     }
@@ -359,7 +360,7 @@ impl FilmState {
     }
 }
 
-/// Samples that all halves of all cells lack, if they all lack the same.
+/// Returns the samples that all halves of all cells need, if they are equal.
 fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
     let (_, [first, _]) = cells.first()?;
     cells.iter().all(|(_, halves)| halves.iter().all(|half| half == first)).then_some(first)
@@ -372,8 +373,8 @@ mod tests {
     use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
 
-    /// A film of two tiles.
-    fn canvas() -> FilmState {
+    /// Creates a film of two tiles.
+    fn state() -> FilmState {
         let film = Film::new(64, 32, None).expect("a film");
         let cells = film.cell_count();
         FilmState {
@@ -406,71 +407,70 @@ mod tests {
         u32::from(done < end)
     }
 
-    /// A tile has more samples, which took so long.
-    fn note(canvas: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
-        let pixels = Pixels::from(canvas.film.tile_rect(tile).expect("a tile"));
+    /// Adds samples to a tile that took this long.
+    fn note(state: &mut FilmState, tile: usize, samples: Range<u32>, seconds: f64) {
+        let pixels = Pixels::from(state.film.tile_rect(tile).expect("a tile"));
         let count = samples.end - samples.start;
         let radiance = (0..pixels.count() as u32 * count).map(|i| Vec3::splat((i % 7) as f32)).collect();
-        canvas.film.add(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
+        state.film.add(tile, &TileSamples { pixels, samples: count, radiance, negative: None });
         let job = Job { tile, pixels, samples };
-        canvas.note(&job, &Cost { rays: RayCounters::default(), seconds });
+        state.note(&job, &Cost { rays: RayCounters::default(), seconds });
     }
 
     #[test]
-    fn work_to_come_costs_in_each_tile_what_it_cost_so_far() {
-        let mut canvas = canvas();
+    fn remaining_samples_cost_as_before_per_tile() {
+        let mut state = state();
         let mut noted = |tile: usize, samples: Range<u32>, seconds: f64| {
-            note(&mut canvas, tile, samples, seconds);
-            [canvas.seconds(), canvas.seconds_to_come(8, in_one)]
-                .map(|seconds| (seconds * 1e6).round() * 1e-6)
+            note(&mut state, tile, samples, seconds);
+            [state.seconds(), state.seconds_to_come(8, in_one)].map(|seconds| (seconds * 1e6).round() * 1e-6)
         };
-        // Of the other one nothing is known: it is like the first.
+        // The second tile is unknown, so it is assumed to cost as much as the first.
         assert_eq!(noted(0, 0..4, 1.0), [1.0, 3.0]);
         assert_eq!(noted(1, 0..2, 10.0), [11.0, 31.0]);
         assert_eq!(noted(1, 2..8, 30.0), [41.0, 1.0]);
-        assert_eq!(canvas.passes(8), [8, 8]);
-        assert_eq!(canvas.passes(16), [8, 16]);
+        assert_eq!(state.passes(8), [8, 8]);
+        assert_eq!(state.passes(16), [8, 16]);
     }
 
     #[test]
-    fn what_samples_take_is_told_by_the_last_ones() {
-        let mut canvas = canvas();
+    fn recent_samples_determine_the_cost() {
+        let mut state = state();
         for tile in 0..2 {
-            note(&mut canvas, tile, 0..1, 4.0);
-            note(&mut canvas, tile, 1..2, 1.0);
+            note(&mut state, tile, 0..1, 4.0);
+            note(&mut state, tile, 1..2, 1.0);
         }
-        assert_eq!(canvas.seconds(), 10.0);
-        // A quarter of the first and all of the second: 2 seconds for 1.25 samples.
+        assert_eq!(state.seconds(), 10.0);
+        // A quarter of the first and all of the second job: 2 seconds for 1.25 samples.
         assert!(
-            (canvas.seconds_to_come(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
+            (state.seconds_to_come(12, in_one) - 2.0 * 10.0 * 1.6).abs() < 1e-9,
             "{}",
-            canvas.seconds_to_come(12, in_one)
+            state.seconds_to_come(12, in_one)
         );
     }
 
     #[test]
-    fn what_pixels_take_is_counted_for_each_job_to_come() {
-        let mut canvas = canvas();
-        // A second a sample, and three for the pixels.
+    fn pixel_cost_counts_for_each_job() {
+        let mut state = state();
+        // A second per sample, and three for the pixels.
         for (samples, seconds) in [(0..1, 4.0), (1..2, 4.0), (2..4, 5.0)] {
-            note(&mut canvas, 0, samples.clone(), seconds);
-            note(&mut canvas, 1, samples, seconds);
+            note(&mut state, 0, samples.clone(), seconds);
+            note(&mut state, 1, samples, seconds);
         }
-        let to_come = |jobs: u32| canvas.seconds_to_come(16, |_, _| jobs);
+        let to_come = |jobs: u32| state.seconds_to_come(16, |_, _| jobs);
         assert!((to_come(1) - 2.0 * (12.0 + 3.0)).abs() < 1e-9, "{}", to_come(1));
         assert!((to_come(2) - 2.0 * (12.0 + 6.0)).abs() < 1e-9, "{}", to_come(2));
     }
 
     #[test]
-    fn no_end_is_foreseen_before_the_noise_tells_it() {
-        let mut canvas = canvas();
-        note(&mut canvas, 0, 0..1, 1.0);
-        note(&mut canvas, 1, 0..1, 1.0);
-        canvas.judge(1, 0.1);
-        assert!(!canvas.is_foreseen(), "one sample has no noise");
-        note(&mut canvas, 0, 1..2, 1.0);
-        note(&mut canvas, 1, 1..2, 1.0);
-        canvas.judge(2, 0.1);
-        assert!(canvas.is_foreseen());
+    fn end_is_unknown_before_noise_is_measured() {
+        let mut state = state();
+        note(&mut state, 0, 0..1, 1.0);
+        note(&mut state, 1, 0..1, 1.0);
+        state.judge(1, 0.1);
+        assert!(!state.is_foreseen(), "one sample has no noise");
+        note(&mut state, 0, 1..2, 1.0);
+        note(&mut state, 1, 1..2, 1.0);
+        state.judge(2, 0.1);
+        assert!(state.is_foreseen());
     }
 }

@@ -1,4 +1,4 @@
-//! First pictures: one sample for each pixel of the preview, shown before the first pass is done.
+//! First images: one sample per preview pixel, shown before the first pass is done.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
@@ -12,23 +12,23 @@ use crate::scene::description::Render;
 use crate::stages::Stop;
 use crate::trace::{Job, Tracer};
 
-/// Time for the first picture of a moved camera.
+/// Time for the first image of a moving camera.
 const HASTE: Duration = Duration::from_millis(6);
 
-/// Inputs of first pictures.
+/// Inputs of first images.
 #[derive(Clone, Copy)]
 pub(crate) struct FirstPictures<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a Plan,
-    /// Whether somebody is moving the camera.
+    /// Whether the camera is being moved.
     pub(crate) is_moved: bool,
-    /// Pixels of first pictures that are traced in a second, as the last one was.
+    /// Pixels per second of the last first image.
     pub(crate) rate: &'a Cell<Option<f64>>,
 }
 
 impl<'a> FirstPictures<'a> {
-    /// Sizes of the first pictures that are much less work than one pass: about the preview's resolution, and before it a hasty
-    /// one if the camera is being moved.
+    /// Returns the sizes of first images that are much less work than a pass: about the preview's, preceded by a
+    /// smaller one if the camera is being moved.
     pub(crate) fn sizes(&self, shown: (u32, u32)) -> Vec<(u32, u32)> {
         let usual = self.usual_size(shown);
         let rate = self.rate.get().filter(|_| self.is_moved);
@@ -36,9 +36,10 @@ impl<'a> FirstPictures<'a> {
         hasty.into_iter().chain([usual]).filter(|size| self.is_less_work(*size)).collect()
     }
 
-    /// The preview's size; half as many pixels if the scene's trees exceed the caches, since rays are slow then.
+    /// Returns the preview's size, or half as many pixels if rays are slow because the scene's trees exceed the CPU
+    /// caches.
     fn usual_size(&self, (width, height): (u32, u32)) -> (u32, u32) {
-        /// Triangles whose trees take some tens of megabytes.
+        /// Number of triangles whose trees take tens of megabytes.
         const LARGE: u64 = 250_000;
         let side =
             |length: u32| ((f64::from(length) * std::f64::consts::FRAC_1_SQRT_2).round() as u32).max(1);
@@ -51,7 +52,7 @@ impl<'a> FirstPictures<'a> {
         pixels(width, height) * 2 <= pixels(full_width, full_height)
     }
 
-    /// Traces a first picture of this size; notes how many pixels are traced in a second. `tick` is called every now and then.
+    /// Traces a first image and records the pixels per second. `tick` is called regularly.
     pub(crate) fn picture(
         &self,
         photons: Option<&PhotonMaps>,
@@ -83,14 +84,14 @@ impl<'a> FirstPictures<'a> {
         Ok(picture)
     }
 
-    /// Shows a first picture without the light of photons, which are yet to be traced: where the whole picture is shown, and
-    /// tracing it once is much less work than one pass. The film gets nothing of it. `tick` is called every now and then.
+    /// Shows a first image before photons are traced, if the whole image is shown and this is much less work than a
+    /// pass. The film is not changed. `tick` is called regularly.
     ///
     /// # Errors
-    /// Cancelled.
+    /// [`Stop::Cancelled`].
     pub(crate) fn show_without_photons(&self, screen: Screen<'_>, tick: impl Fn()) -> Result<(), Stop> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
-        // Views of numbers are stretched, and one of them is of the photons themselves.
+        // Skip views of data, which depend on the range of the whole image or show the photons themselves.
         let is_of_light = self.plan.tone.range_map == RangeMap::None;
         let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
         let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
@@ -100,9 +101,10 @@ impl<'a> FirstPictures<'a> {
     }
 }
 
-/// Size of a first picture that takes [`HASTE`] at this rate of pixels a second. `None` if the usual picture takes hardly longer.
+/// Returns the size of an image that takes [`HASTE`] at `rate` pixels per second. `None` if the usual size is hardly
+/// slower.
 fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
-    /// Pixels across of the smallest.
+    /// Minimum width in pixels.
     const LEAST: f64 = 16.0;
     let share = (rate * HASTE.as_secs_f64() / (f64::from(width) * f64::from(height))).sqrt();
     let side =
@@ -110,7 +112,7 @@ fn hasty_size((width, height): (u32, u32), rate: f64) -> Option<(u32, u32)> {
     (share < 0.8).then(|| (side(width).min(width), side(height).min(height)))
 }
 
-/// Small pieces, so that all threads end at about the same time.
+/// Splits a rectangle into small jobs, so that all threads end at about the same time.
 fn jobs(rect: Rect) -> Vec<Job> {
     const FEW: usize = 5000;
     let side = if rect.area() < FEW { 8 } else { 16 };
@@ -121,7 +123,7 @@ fn jobs(rect: Rect) -> Vec<Job> {
     places.filter_map(piece).enumerate().map(job).collect()
 }
 
-/// The pixels of a smaller picture that lie under a rectangle of a larger one.
+/// Returns the pixels of a smaller image that correspond to a rectangle of a larger one.
 fn scale(rect: Rect, from: (u32, u32), to: (u32, u32)) -> Rect {
     let along = |start: u32, len: u32, from: u32, to: u32| {
         let at = |pixel: u32| u64::from(pixel) * u64::from(to) / u64::from(from);
@@ -139,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_pieces_of_a_coarse_picture_cover_it_once() {
+    fn jobs_cover_the_image_once() {
         let rect = Rect { x: 3, y: 5, width: 40, height: 17 };
         let mut seen = vec![0; 64 * 64];
         for job in jobs(rect) {
@@ -157,16 +159,16 @@ mod tests {
     }
 
     #[test]
-    fn a_hasty_picture_is_as_large_as_its_time_allows() {
+    fn hasty_image_fits_its_time() {
         let pixels_of = |rate: f64| hasty_size((120, 80), rate / HASTE.as_secs_f64());
-        assert_eq!(pixels_of(9600.0), None, "there is time for the usual one");
+        assert_eq!(pixels_of(9600.0), None, "the usual size is fast enough");
         assert_eq!(pixels_of(2400.0), Some((60, 40)));
-        assert_eq!(pixels_of(1.0), Some((16, 11)), "one that still shows something");
+        assert_eq!(pixels_of(1.0), Some((16, 11)), "the minimum size");
         assert_eq!(hasty_size((10, 5), 0.0), Some((10, 5)));
     }
 
     #[test]
-    fn a_crop_covers_its_part_of_a_smaller_picture() {
+    fn crop_covers_its_part_of_a_smaller_image() {
         let rect = Rect { x: 10, y: 30, width: 5, height: 10 };
         assert_eq!(scale(rect, (100, 100), (10, 10)), Rect { x: 1, y: 3, width: 1, height: 1 });
         let last = Rect { x: 99, y: 99, width: 1, height: 1 };

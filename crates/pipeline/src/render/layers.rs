@@ -1,7 +1,7 @@
-//! Layers of an EXR file: numbers about the pixels of the finished picture, by the same samples.
+//! Layers of an EXR file: additional channels for the pixels of the finished image.
 //!
-//! A layer of light or of first hits is a film of its own, whose pixels get as many samples as those of the picture. So the parts of
-//! the light add up to the picture, also where noise decided how many samples a pixel has.
+//! A layer of light or of first hits is rendered to its own film, with as many samples per pixel as the image has. So
+//! the light components add up to the image even if noise decided the number of samples.
 
 use super::film_state::FilmState;
 use super::scheduler::{Rendering, Scheduler};
@@ -16,17 +16,17 @@ use crate::stages::Stop;
 use crate::stages::photons::PhotonStore;
 use crate::trace::Tracer;
 
-/// Names of the channels of colours, of directions and of numbers, as compositing programs know them.
+/// Channel names of colors, directions and scalars, as compositing programs expect them.
 const COLOR: &[&str] = &["R", "G", "B"];
 const DIRECTION: &[&str] = &["X", "Y", "Z"];
 const DISTANCE: &[&str] = &["Z"];
 const NUMBER: &[&str] = &["X"];
 
-/// Origin of a layer's numbers.
+/// Source of a layer's values.
 enum Source {
-    /// The samples of a view.
+    /// Samples of a view.
     View(View),
-    /// Numbers of the picture's film.
+    /// Values of the image's film.
     Film(fn(&FilmState) -> RadianceImage),
 }
 
@@ -45,7 +45,7 @@ impl Layer {
         }
     }
 
-    /// Work of a layer, next to that of the picture.
+    /// Returns the cost of a layer relative to the image.
     fn work(self) -> f64 {
         match self {
             Self::Albedo | Self::Normal | Self::Depth => 0.1,
@@ -55,14 +55,14 @@ impl Layer {
     }
 }
 
-/// Variance of each pixel's luminance: the squared standard error of its mean.
+/// Returns the variance of each pixel's luminance: the squared standard error of its mean.
 fn variance(state: &FilmState) -> RadianceImage {
     let mut image = state.film.image(Quantity::Error);
     image.pixels.iter_mut().for_each(|error| *error *= *error);
     image
 }
 
-/// The part of all work, from 0 to 1, that is done before a layer and the part behind it. The picture comes before number 0.
+/// Returns the progress fractions at the begin and end of a layer. `None` is the image, which precedes layer 0.
 pub(crate) fn progress(layers: &[Layer], number: Option<usize>) -> [f64; 2] {
     let work = |layers: &[Layer]| layers.iter().map(|layer| layer.work()).sum::<f64>();
     let all = 1.0 + work(layers);
@@ -72,10 +72,10 @@ pub(crate) fn progress(layers: &[Layer], number: Option<usize>) -> [f64; 2] {
     }
 }
 
-/// The layers of a finished film, in their order.
+/// Renders the layers of a finished film, in order.
 ///
 /// # Errors
-/// Cancelled; no memory for a film.
+/// [`Stop::Cancelled`], or not enough memory for a film.
 pub(crate) fn layers(
     state: &FilmState,
     rendering: &Rendering<'_>,
@@ -93,7 +93,7 @@ pub(crate) fn layers(
     Ok(images)
 }
 
-/// The picture of a view by as many samples as a film has.
+/// Renders a view with as many samples per pixel as a film has.
 fn of_view(
     view: View,
     picture: &FilmState,
@@ -102,7 +102,7 @@ fn of_view(
 ) -> Result<RadianceImage, Stop> {
     let mut plan = rendering.plan.clone();
     plan.settings.view = view;
-    // Samples are as many as the picture has, whatever ended it.
+    // Use the samples of the image, whatever ended its render.
     plan.settings.render.error = 0.0;
     plan.settings.render.samples = picture.film.samples().max;
     plan.time_seconds = None;
@@ -123,11 +123,11 @@ fn of_view(
         preview: None,
         first: None,
         sink: &sink,
-        // What a person orders meanwhile is about the picture.
+        // Orders during this render concern the image.
         pulse: &|_, _| (),
         take_preview: &|| None,
         share: None,
-        keeping: None,
+        checkpointer: None,
         ..*rendering
     };
     let signed = |normal: Vec3| if normal == Vec3::ZERO { normal } else { normal * 2.0 - Vec3::ONE };
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn progress_goes_from_the_picture_through_all_layers() {
+    fn progress_spans_the_image_and_all_layers() {
         let all = [Layer::Depth, Layer::Samples, Layer::Diffuse, Layer::Specular];
         let ends: Vec<_> = [None, Some(0), Some(1), Some(2), Some(3)].map(|at| progress(&all, at)).to_vec();
         assert_eq!((ends[0][0], ends[4][1]), (0.0, 1.0));

@@ -1,62 +1,62 @@
-//! Goals by noise: which parts of a picture have enough samples.
+//! Goals from noise: which parts of an image have enough samples.
 //!
-//! A picture whose samples decide by themselves when they stop is too dark: rare bright samples end no sampling before they are
-//! met, and prolong it once they are. So each half of a tile, every other pixel, stops by the noise of the other half, whose
-//! samples are independent and about as noisy. A tenth of the bias is left, as a half that has stopped tells the other no more;
-//! at worst that is a thirtieth of the noise.
+//! An image whose samples decide by themselves when they stop is too dark: without rare bright samples sampling stops
+//! early, and with them it continues. So each half of a tile (every other pixel) stops according to the noise of the
+//! other half, whose samples are independent and about as noisy. A tenth of the bias remains, because a half that has
+//! stopped yields no more information; in the worst case that is a thirtieth of the noise.
 
 use crate::film::{CELLS, Convergence, Film, HalfNoise, PREPASS_SAMPLES, Prepass, samples_to_reduce_error};
 
-/// Samples before which noise is not asked for.
+/// Minimum number of samples for noise estimates.
 pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
 
-/// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
+/// Fraction of the noise target that is aimed at, because parts measured too low stop early.
 pub(crate) const AIM: f64 = 0.85;
 
-/// Ratio to the requested error from which a tile counts as missed: above the chance errors of the measurement.
+/// Ratio to the noise target above which a tile is reported, beyond the uncertainty of the measurement.
 const TOO_MUCH: f64 = 1.5;
 
-/// Most samples ever expected; [`u32::MAX`] means unknown.
+/// Maximum number of expected samples. [`u32::MAX`] means unknown.
 pub(crate) const MOST: u32 = u32::MAX - 1;
 
-/// The least brightness that noise is held against, as a part of the picture's.
+/// Minimum brightness that noise is compared with, relative to the image's.
 const LEAST_BRIGHTNESS: f64 = 0.01;
 
-/// Samples that the halves of each cell are to have.
+/// Maximum samples of both halves of each cell.
 #[derive(Debug)]
 pub(crate) struct Goals {
-    /// Decided goals; [`u32::MAX`] while undecided.
+    /// Decided goals. [`u32::MAX`] while undecided.
     pub(super) decided: Vec<[u32; 2]>,
-    /// Samples at which each tile was judged last: once for each number.
+    /// Samples at which each tile was last judged. Tiles are judged once per number of samples.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the picture's [`Prepass`], when noise was first asked for.
+    /// Mean luminance of the image's [`Prepass`], once noise has been judged.
     pub(super) brightness: Option<f64>,
 }
 
 impl Goals {
-    /// For so many cells, of which nothing is known.
+    /// Creates undecided goals for this many cells.
     pub(crate) fn none(cells: usize) -> Self {
         Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
     }
 
-    /// Samples that a half of a cell is to have at most.
+    /// Returns the maximum samples of a half of a cell.
     pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
         self.decided[cell][half]
     }
 
-    /// Bytes that they take.
+    /// Returns the memory size in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.decided.as_slice()) + size_of_val(self.judged.as_slice())
     }
 
-    /// Whether any half gets fewer samples than these.
+    /// Whether any half gets fewer than `samples` samples.
     pub(crate) fn are_below(&self, samples: u32) -> bool {
         self.decided.as_flattened().iter().any(|goal| *goal < samples)
     }
 
-    /// Decide for every half that has no goal yet and has now `samples`, a power of two, by the noise of the other one. `done` are
-    /// the samples that all of them have. Before all have enough of them for the picture's brightness, nothing is decided. In a pool
-    /// its threads share the work.
+    /// Decides the goals of all halves that have none and now have `samples`, a power of two, from the noise of the
+    /// other half. `done` is the number of samples of each half. Decides nothing before all halves have enough samples
+    /// for the image's brightness. Runs in parallel within a thread pool.
     pub(crate) fn judge(
         &mut self,
         film: &Film,
@@ -80,8 +80,8 @@ impl Goals {
         Some(Judgement { noise, samples, aim })
     }
 
-    /// Tiles that have all samples which they are to have, and more noise than [`TOO_MUCH`] times the error asked for: what is in few
-    /// pixels of one half alone does not hold that half up. And the noise of the worst of them.
+    /// Returns the number of tiles that have reached their goals with more noise than [`TOO_MUCH`] times the target,
+    /// and the noise of the worst. Noise in few pixels of one half does not delay that half.
     pub(crate) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
         let noise = film.map_tiles(|tile| {
@@ -99,7 +99,7 @@ impl Goals {
         Some((too_much().count(), worst))
     }
 
-    /// Whether a half in a tile has no goal yet, and has now so many samples.
+    /// Whether a half in a tile has no goal and now has `samples` samples.
     pub(crate) fn is_open(&self, tile: usize, done: &[[u32; 2]], samples: u32) -> bool {
         let cells = self.decided.iter().zip(done).skip(CELLS * tile).take(CELLS);
         cells
@@ -107,7 +107,7 @@ impl Goals {
             .any(|(goal, done)| *goal == u32::MAX && *done == samples)
     }
 
-    /// Whether a half that is to have them has fewer samples than the least.
+    /// Whether a half that needs more samples has fewer than [`LEAST`].
     fn lacks_least(&self, done: &[[u32; 2]]) -> bool {
         let mut halves = self.decided.as_flattened().iter().zip(done.as_flattened());
         halves.any(|(goal, done)| goal > done && *done < LEAST)
@@ -125,7 +125,7 @@ impl Goals {
             for half in 0..2 {
                 let Some(noise) = of_others[half].filter(|_| !was_decided[half]) else { continue };
                 let wanted = aim.samples(&noise);
-                // Where the other half has no more samples to come, nothing more will be known.
+                // If the other half is finished, no more information will arrive.
                 if was_decided[1 - half] || wanted <= done[half].saturating_mul(2) {
                     self.decided[cell][half] = wanted.max(done[half]);
                 }
@@ -134,21 +134,21 @@ impl Goals {
     }
 }
 
-/// Noise that goals were decided by.
+/// Noise from which goals were decided.
 #[derive(Debug)]
 pub(crate) struct Judgement {
-    /// Noise of each tile. `None` for a tile that has its goals, or other samples.
+    /// Noise of each tile. `None` for tiles with goals or other samples.
     pub(crate) noise: Vec<Option<TileNoise>>,
-    /// Samples that the tiles had.
+    /// Samples of the tiles.
     pub(crate) samples: u32,
     pub(crate) aim: Aim,
 }
 
-/// Noise of a tile, by its samples.
+/// Noise of a tile, measured from its samples.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TileNoise {
     pub(crate) halves: [Option<HalfNoise>; 2],
-    /// Ratio of its variance before and after the last doubling of samples.
+    /// Ratio of the variances before and after the last doubling of samples.
     pub(crate) fall: Option<f64>,
 }
 
@@ -156,25 +156,25 @@ impl TileNoise {
     fn of(film: &Film, tile: usize) -> Self {
         let noise = |half| {
             let noise = film.tile_noise(tile, half)?;
-            // The upper end of what it may be: where few bright pixels tell it, others may not have been met yet.
+            // Use the upper bound of the noise: if it is from few bright pixels, others may not have been sampled yet.
             Some(HalfNoise { variance: noise.variance * (1.0 + film.tile_spread(tile, half)), ..noise })
         };
         Self { halves: [0, 1].map(noise), fall: film.tile_fall(tile) }
     }
 }
 
-/// The error to reach, and the brightness that it is relative to.
+/// Noise target, and the brightness it is relative to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Aim {
-    /// The requested error.
+    /// Noise target.
     pub(crate) error: f64,
-    /// Mean luminance of the picture.
+    /// Mean luminance of the image.
     brightness: f64,
     pub(crate) convergence: Convergence,
 }
 
 impl Aim {
-    /// Samples that bring noise to the error asked for.
+    /// Returns the samples at which noise reaches the target.
     fn samples(&self, noise: &HalfNoise) -> u32 {
         let relative = self.relative(noise);
         if !(relative > 0.0) {
@@ -182,7 +182,7 @@ impl Aim {
         }
         let part = AIM * self.error / relative;
         let doubled = noise.samples.saturating_mul(2);
-        // Up to the next power of two each sample counts as an independent one, there all of them are worth more.
+        // Up to the next power of two samples count as independent ones. There, all are worth more.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
             return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
@@ -190,7 +190,7 @@ impl Aim {
         samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
     }
 
-    /// Noise over the brightness that it is held against.
+    /// Returns the noise relative to the brightness it is compared with.
     pub(crate) fn relative(&self, noise: &HalfNoise) -> f64 {
         noise.variance.sqrt() / noise.mean.max(LEAST_BRIGHTNESS * self.brightness)
     }
@@ -203,7 +203,7 @@ pub(crate) mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// A film of one tile, whose halves have samples of a mean and a spread each.
+    /// Creates a film of one tile whose halves have samples with a given mean and spread.
     pub(crate) fn film(halves: [(f32, f32); 2], samples: u32) -> Film {
         const COLUMNS: u32 = 32;
         let film = Film::new(COLUMNS, 2, None).expect("a film");
@@ -224,27 +224,27 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn each_half_stops_by_the_noise_of_the_other() {
-        // The first half is smooth, the other one is not.
+    fn each_half_stops_on_the_other_half_s_noise() {
+        // The first half is smooth, the second is not.
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.of(0, 1), 16, "the other half has no noise");
+        assert_eq!(goals.of(0, 1), 16, "the first half has no noise");
         assert_eq!(goals.of(0, 0), u32::MAX);
     }
 
     #[test]
-    fn noise_that_one_half_alone_has_is_told_where_it_stays() {
+    fn noise_in_only_one_half_is_reported() {
         let rough = film([(1.0, 0.0), (1.0, 1.0)], 16);
         let goals = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
-        assert_eq!(goals.missed(&rough, 0.01), None, "the first half goes on");
+        assert_eq!(goals.missed(&rough, 0.01), None, "the first half continues");
         let clean = judged([(1.0, 0.0); 2], 16, 0.01);
         assert_eq!(clean.missed(&film([(1.0, 0.0); 2], 16), 0.01), None);
-        // A standard error of √(1/12/16), in one of two halves.
-        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("nothing is told") };
+        // A standard error of √(1/12/16) in one of two halves.
+        let Some((tiles, worst)) = clean.missed(&rough, 0.01) else { panic!("no missed tile") };
         assert!(tiles == 1 && (worst / 0.051 - 1.0).abs() < 0.3, "{tiles} {worst}");
     }
 
     #[test]
-    fn nothing_is_decided_before_there_are_samples_enough() {
+    fn nothing_is_decided_with_few_samples() {
         for (samples, is_open) in [(8, true), (16, false)] {
             let goals = judged([(1.0, 0.0); 2], samples, 0.01);
             assert_eq!(goals.of(0, 0) == u32::MAX, is_open, "{samples}");
@@ -252,16 +252,17 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_within_twice_the_samples_is_decided_and_more_is_asked_for_again() {
-        // A standard error of sqrt(1/12/16) = 0.072, which may be 0.082 by so few pixels: 24 samples bring that to the aim.
+    fn goals_within_twice_the_samples_are_decided() {
+        // A standard error of sqrt(1/12/16) = 0.072, up to 0.082 with so few pixels, needs 24 samples to reach the
+        // target.
         let goals = judged([(1.0, 1.0); 2], 16, 0.08);
         assert!((17..=32).contains(&goals.of(0, 0)), "{}", goals.of(0, 0));
         assert_eq!(judged([(1.0, 1.0); 2], 16, 0.005).of(0, 0), u32::MAX);
     }
 
     #[test]
-    fn noise_is_held_against_a_hundredth_of_the_picture_where_it_is_dark() {
-        // A bright tile beside a dark one, with as much noise for their brightness.
+    fn dark_parts_use_a_minimum_brightness() {
+        // A bright and a dark tile with equal relative noise.
         let film = Film::new(64, 2, None).expect("a film");
         let mut next = unit(9);
         for (tile, mean) in [(0, 1.0), (1, 1e-6)] {
@@ -277,8 +278,8 @@ pub(crate) mod tests {
         assert_eq!((goals.of(0, 0), goals.of(CELLS, 0)), (u32::MAX, 16));
     }
 
-    /// The mean of a tile whose samples are rarely bright, 1 in the long run, and which stops by its noise; or where each half stops
-    /// by its own.
+    /// Returns the mean of a tile with rare bright samples, whose expected value is 1, that stops on noise: of the
+    /// other half, or of its own half (`by_own`).
     fn stopped(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const MOST: u32 = 256;
         let film = Film::new(4, 4, None).expect("a film");
@@ -299,7 +300,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn to_stop_by_the_noise_of_the_other_half_is_next_to_no_bias() {
+    fn stopping_on_the_other_half_is_nearly_unbiased() {
         let mut next = unit(11);
         let mut mean_of = |by_own| {
             const TILES: u32 = 20_000;
@@ -311,8 +312,8 @@ pub(crate) mod tests {
         let (mean, error) = mean_of(false);
         let (own, own_error) = mean_of(true);
         assert!(error.max(own_error) < 0.004, "{error} {own_error}");
-        // The noise asked for is 0.6.
+        // The noise target is 0.6.
         assert!((mean - 1.0).abs() < 0.04 * 0.6, "{mean} ± {error}");
-        assert!(own < 0.9, "the samples tell what stops by itself: {own} ± {own_error}");
+        assert!(own < 0.9, "stopping on own noise is biased: {own} ± {own_error}");
     }
 }

@@ -1,4 +1,4 @@
-//! The film as it is, at the size of a screen, into the slot.
+//! Previews of the current film at the size of the screen.
 
 use std::time::{Duration, Instant};
 
@@ -11,112 +11,111 @@ use crate::film::tone::{ToneMapping, develop};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
 use crate::keys;
 use crate::plan::Plan;
-use crate::protocol::{PreviewSize, PreviewSource, Section, Spot};
+use crate::protocol::{ImagePosition, PreviewSize, PreviewSource, Section};
 use crate::sink::Sink;
 
-/// The longest that a film is taken up without a look at the orders.
+/// Maximum time to update a preview between two checks for orders.
 const PATIENCE: Duration = Duration::from_millis(4);
 
-/// The screen's preview: what it shows, and where it goes.
+/// Destination and contents of previews.
 #[derive(Clone, Copy)]
 pub(crate) struct Screen<'a> {
-    /// None: nothing is shown.
+    /// Maximum size of previews. `None` disables them.
     pub(crate) bounds: Option<PreviewSize>,
     pub(crate) plan: &'a Plan,
     pub(crate) sink: &'a Sink,
 }
 
 impl Screen<'_> {
-    /// Columns and rows of pictures of the whole.
+    /// Returns the width and height of previews of the whole image.
     pub(crate) fn size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;
         self.bounds.and_then(|bounds| fit(render.width, render.height, bounds))
     }
 
-    /// The whole film, unless that is cancelled. For when no tile is being rendered, as the pool helps.
-    pub(crate) fn show(&self, canvas: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
+    /// Sends a preview of the whole film unless cancelled. Uses the pool, so no tile may be rendering.
+    pub(crate) fn show(&self, state: &mut FilmState, pool: &ThreadPool, token: &CancelToken) {
         let Some(size) = self.size() else { return };
-        if self.say_section(canvas, true) {
+        if self.say_section(state, true) {
             return;
         }
-        while !pool.install(|| catch_up(canvas, self.plan.settings.view.quantity(), size)) {
+        while !pool.install(|| catch_up(state, self.plan.settings.view.quantity(), size)) {
             if token.is_cancelled() {
                 return;
             }
         }
-        self.say(canvas, true);
+        self.say(state, true);
     }
 
-    /// The same between two tiles, on this thread and for a short time; what is left is for the next call. Whether a
-    /// picture came of it.
-    pub(crate) fn show_some(&self, canvas: &mut FilmState) -> bool {
+    /// Updates the preview for a short time between two tiles, on this thread. Returns whether it was complete and
+    /// sent.
+    pub(crate) fn show_some(&self, state: &mut FilmState) -> bool {
         let Some(size) = self.size() else { return false };
-        if self.say_section(canvas, false) {
+        if self.say_section(state, false) {
             return true;
         }
-        catch_up(canvas, self.plan.settings.view.quantity(), size);
-        let is_whole = canvas.previewer.as_ref().is_some_and(Previewer::is_whole);
+        catch_up(state, self.plan.settings.view.quantity(), size);
+        let is_whole = state.previewer.as_ref().is_some_and(Previewer::is_whole);
         if is_whole {
-            self.say(canvas, false);
+            self.say(state, false);
         }
         is_whole
     }
 
-    fn say(&self, canvas: &FilmState, has_time: bool) {
-        if let Some(previewer) = &canvas.previewer {
-            // The first coarse picture has none of the numbers about samples.
-            let base = canvas.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
+    fn say(&self, state: &FilmState, has_time: bool) {
+        if let Some(previewer) = &state.previewer {
+            // The first image has no data about samples.
+            let base = state.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
             let image = previewer.picture(base);
-            self.send(canvas, &image, &self.tone(canvas, &image, has_time), None);
+            self.send(state, &image, &self.tone(state, &image, has_time), None);
         }
     }
 
-    /// Shows the image's own pixels, if the front end wants them.
-    fn say_section(&self, canvas: &FilmState, has_time: bool) -> bool {
+    /// Sends a 1:1 section of the image if the front end wants one. Returns whether it does.
+    fn say_section(&self, state: &FilmState, has_time: bool) -> bool {
         let Some(rect) = self.section() else { return false };
         let quantity = self.plan.settings.view.quantity();
-        let base = canvas.base.as_ref().filter(|_| quantity == Quantity::Radiance);
+        let base = state.base.as_ref().filter(|_| quantity == Quantity::Radiance);
         let render = &self.plan.settings.render;
         let section = Section::of(rect, (render.width, render.height));
-        let image = canvas.film.section(quantity, rect, base);
-        self.send(canvas, &image, &self.tone(canvas, &image, has_time), Some(section));
+        let image = state.film.section(quantity, rect, base);
+        self.send(state, &image, &self.tone(state, &image, has_time), Some(section));
         true
     }
 
-    /// Shows a picture that lacks the light of photons, which are yet to come. It is of colours: no view of numbers gathers
-    /// them.
+    /// Sends an image that lacks the photons' light. It shows radiance, because no data view uses photons.
     pub(crate) fn show_without_photons(&self, image: &RadianceImage) {
         self.sink.preview_without_photons(develop(image, &self.plan.tone.resolved_for(image)));
     }
 
-    fn send(&self, canvas: &FilmState, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
+    fn send(&self, state: &FilmState, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
         let range = tone.range_map.range().map(|range| range.limits());
         let source = PreviewSource {
-            image: keys::image(canvas.key, self.plan, canvas.number),
-            is_finished: canvas.is_finished(self.plan),
+            image: keys::image(state.key, self.plan, state.number),
+            is_finished: state.is_finished(self.plan),
         };
         self.sink.preview(develop(image, tone), range, section, source);
     }
 
-    /// Tone mapping of a preview. Numbers are stretched by the range of the image that is written, since pixels of a preview
-    /// average over gaps. An image with pixels without samples, or a large one while there is no time, is stretched by the range
-    /// of the preview.
-    fn tone(&self, canvas: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
-        /// Pixels that are looked through in a few milliseconds.
+    /// Returns the tone mapping of a preview. Data are mapped from the range of the full image, because preview pixels
+    /// are averages. If some pixels have no samples, or a large image must be shown quickly, the range of the preview
+    /// is used.
+    fn tone(&self, state: &FilmState, image: &RadianceImage, has_time: bool) -> ToneMapping {
+        /// Pixels that can be scanned in a few milliseconds.
         const QUICK: usize = 1 << 18;
         let tone = self.plan.tone;
-        let is_known = canvas.is_covered() && (has_time || canvas.film.crop().area() <= QUICK);
+        let is_known = state.is_covered() && (has_time || state.film.crop().area() <= QUICK);
         if tone.range_map == RangeMap::None || !is_known {
             return tone.resolved_for(image);
         }
-        tone.resolved_for(&canvas.film.image(self.plan.settings.view.quantity()))
+        tone.resolved_for(&state.film.image(self.plan.settings.view.quantity()))
     }
 
-    /// The pixels that are shown one by one.
+    /// Returns the pixels of a 1:1 section.
     fn section(&self) -> Option<Rect> {
         let render = &self.plan.settings.render;
         let PreviewSize { width, height, around } = self.bounds?;
-        let Spot { x, y } = around?;
+        let ImagePosition { x, y } = around?;
         let along = |middle: f64, length: u32, side: u32| {
             let length = length.min(side);
             let start = (middle * f64::from(side)).max(0.0) as u32;
@@ -128,14 +127,14 @@ impl Screen<'_> {
     }
 }
 
-/// Take up what changed, for a short time; whether that was all.
-fn catch_up(canvas: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
-    canvas.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
-    let previewer = canvas.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
-    previewer.update(&canvas.film, Some(Instant::now() + PATIENCE))
+/// Updates the previewer for a short time. Returns whether it is up to date.
+fn catch_up(state: &mut FilmState, quantity: Quantity, (width, height): (u32, u32)) -> bool {
+    state.previewer.take_if(|it| it.size() != (width, height) || it.quantity() != quantity);
+    let previewer = state.previewer.get_or_insert_with(|| Previewer::of(quantity, width, height));
+    previewer.update(&state.film, Some(Instant::now() + PATIENCE))
 }
 
-/// The largest picture of this aspect ratio inside the bounds.
+/// Returns the largest size with this aspect ratio inside the bounds.
 fn fit(width: u32, height: u32, bounds: PreviewSize) -> Option<(u32, u32)> {
     if bounds.width == 0 || bounds.height == 0 {
         return None;
@@ -156,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_preview_keeps_the_aspect_ratio_inside_its_bounds() {
+    fn preview_keeps_the_aspect_ratio() {
         let bounds = |width, height| PreviewSize { width, height, around: None };
         assert_eq!(fit(640, 480, bounds(80, 48)), Some((64, 48)));
         assert_eq!(fit(640, 480, bounds(64, 100)), Some((64, 48)));

@@ -1,14 +1,14 @@
-//! The schedule of a render: first picture, first pass, later passes, and rounds if there is a budget of time.
+//! Scheduling of a render: first image, first pass, later passes, and rounds within a time limit.
 
 use std::cell::Cell;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::checkpointer::Checkpointer;
 use super::film_state::{Before, FilmState};
 use super::first_picture::FirstPictures;
 use super::forecast::{Forecast, Moment};
-use super::keeping::Keeping;
 use super::noise_goals::LEAST;
 use super::preview::Screen;
 use super::share::Share;
@@ -16,70 +16,69 @@ use super::time_budget::next_round;
 use crate::film::{PREPASS_SAMPLES, Prepass, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::math::Vec3;
-use crate::pace::Clock;
 use crate::plan::Plan;
 use crate::protocol::{PreviewSize, Section};
 use crate::scene::description::Render;
 use crate::sink::Sink;
 use crate::stages::Stop;
-use crate::stages::photons::{PhotonStore, Sending};
+use crate::stages::photons::{PhotonContext, PhotonStore};
+use crate::stopwatch::Clock;
 use crate::trace::{Job, Tracer, next_pass};
 
-/// Shortest time between two reports of progress.
+/// Minimum time between two progress reports.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(60);
-/// Shortest time between two previews.
+/// Minimum time between two previews.
 const PREVIEW_INTERVAL: Duration = Duration::from_millis(66);
-/// A preview takes at most one part in so many of the time.
+/// Previews may use at most `1/PREVIEW_SHARE` of the time.
 const PREVIEW_SHARE: u32 = 10;
 
-/// A render: the inputs of the stage.
+/// Inputs of the render stage.
 pub(crate) struct Rendering<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) plan: &'a Plan,
-    /// The scene's photons, if it gathers any.
+    /// The scene's photons, if the image uses them.
     pub(crate) photons: Option<&'a PhotonStore>,
     pub(crate) preview: Option<PreviewSize>,
     pub(crate) most_film_bytes: u64,
-    /// Start from an empty film whatever is kept.
+    /// Start from an empty film even if one is cached.
     pub(crate) force: bool,
-    /// The section that gets its samples first.
+    /// Section that is rendered first.
     pub(crate) first: Option<Section>,
     pub(crate) sink: &'a Sink,
-    /// Called often with the film as it is, for orders that come during the render; and whether every pixel of it
-    /// has a sample.
+    /// Called often with the current film and whether every pixel has a sample, to handle orders during the render.
     pub(crate) pulse: &'a dyn Fn(&FilmState, bool),
-    /// Takes an order for another size of the previews.
+    /// Takes an order for another preview size.
     pub(crate) take_preview: &'a dyn Fn() -> Option<Option<PreviewSize>>,
-    /// Whether somebody is moving the camera: the first picture must come soon, however small it is.
+    /// Whether the camera is being moved, so that the first image must be fast, however small.
     pub(crate) is_moved: bool,
-    /// Pixels of first pictures that are traced in a second, as the last one was.
+    /// Pixels per second of the last first image.
     pub(crate) coarse_rate: &'a Cell<Option<f64>>,
-    /// The share of the picture that is rendered. `None` for all of it.
+    /// The share of the image that is rendered. `None` for the whole image.
     pub(crate) share: Option<Share>,
-    /// Checkpoints, if there are any.
-    pub(crate) keeping: Option<&'a Keeping<'a>>,
+    /// Checkpointer, if the render has checkpoints.
+    pub(crate) checkpointer: Option<&'a Checkpointer<'a>>,
 }
 
-/// One run of the stage: passes and rounds over a film, with progress and previews between the tiles.
+/// Runs passes and rounds over a film, with progress and previews between tiles.
 pub(crate) struct Scheduler<'a> {
     pub(crate) state: &'a mut FilmState,
     rendering: &'a Rendering<'a>,
     screen: Screen<'a>,
     clock: Clock,
     forecast: Forecast,
-    /// Pixels times samples.
+    /// Pixels times samples so far.
     units: u64,
     /// Units of earlier renders.
     units_before: u64,
     pub(crate) rays: RayCounters,
-    /// Seconds of the process whose checkpoint this goes on from.
+    /// Seconds of the process whose checkpoint this render continues.
     seconds_before: f64,
-    /// Whether some pixels have no sample yet: until they have, nothing but a cancel ends the render.
+    /// Whether some pixels have no sample. Until they do, only a cancellation ends the render.
     is_first: bool,
     is_over_time: bool,
     next_progress: Instant,
     next_preview: Instant,
-    /// Change of each sample before it is added. `None` for samples that stay as they are.
+    /// Transformation of each sample before it is added. `None` for none.
     pub(crate) changed: Option<&'a (dyn Fn(Vec3) -> Vec3 + Sync)>,
 }
 
@@ -107,34 +106,34 @@ impl<'a> Scheduler<'a> {
         }
     }
 
-    /// Brings the film to the requested samples or error.
+    /// Renders the film to the requested samples or noise target.
     ///
     /// # Errors
-    /// Cancelled. The film keeps what it has.
+    /// [`Stop::Cancelled`]. The film keeps its samples.
     pub(crate) fn run(&mut self) -> Result<(), Stop> {
         self.state.is_kept = false;
         let ran = self.go();
         let (traced, seconds) = (self.traced(), self.rendered_seconds());
-        if let (Some(keeping), Err(Stop::Cancelled)) = (self.rendering.keeping, &ran) {
-            self.state.is_kept = keeping.at_the_end(self.state, traced, seconds);
+        if let (Some(checkpointer), Err(Stop::Cancelled)) = (self.rendering.checkpointer, &ran) {
+            self.state.is_kept = checkpointer.at_the_end(self.state, traced, seconds);
         }
         self.state.traced = traced;
         ran
     }
 
-    /// Rays of all requests for this film.
+    /// Returns the rays of all requests for this film.
     pub(crate) fn traced(&self) -> RayCounters {
         let mut traced = self.state.traced;
         traced += self.rays;
         traced
     }
 
-    /// Seconds in which all requests have rendered this film.
+    /// Returns the seconds that all requests spent on this film.
     fn rendered_seconds(&mut self) -> f64 {
         self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
-    /// Seconds of rendering, those of an earlier process too.
+    /// Returns the seconds of rendering, including an earlier process.
     pub(crate) fn seconds(&mut self) -> f64 {
         self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
@@ -160,7 +159,7 @@ impl<'a> Scheduler<'a> {
             self.pilot()?;
         }
         if let Some(first) = self.first() {
-            // Noise is held against the brightness of the whole picture, which is known then.
+            // Noise is compared with the brightness of the whole image, so render that first.
             let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
             self.passes(None, of_all)?;
             self.passes(Some(first), samples)?;
@@ -171,13 +170,13 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// The pixels that come before the rest.
+    /// Returns the pixels that are rendered first.
     fn first(&self) -> Option<Rect> {
         let Render { width, height, .. } = self.rendering.plan.settings.render;
         self.rendering.first.map(|section| section.pixels((width, height)))
     }
 
-    /// Renders the pilot of the picture, of which this process has a share.
+    /// Renders the prepass of the whole image, of which this process renders a share.
     fn pilot(&mut self) -> Result<(), Stop> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
@@ -186,7 +185,7 @@ impl<'a> Scheduler<'a> {
         let job = |number: u64| {
             let (x, y) = pilot.position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
-            // The job's number stands for its tile.
+            // Use the tile number for the index of the job.
             Job { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
         };
         let jobs: Vec<Job> = (0..pilot.count()).map(job).collect();
@@ -203,17 +202,17 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Judges the noise that a checkpoint or a cancelled request has left unjudged.
+    /// Judges the noise of samples from a checkpoint or a cancelled request.
     fn judge_what_is_there(&mut self, part: Option<Rect>) {
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.samples_in(part, samples);
-        // Nothing is decided by fewer samples.
+        // Fewer samples decide nothing.
         if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
         }
     }
 
-    /// Pass after pass until a part (none: all) has so many samples, or those that it is to have.
+    /// Runs passes until `part` (`None` for all) has this many samples or has reached its goals.
     fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
         let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
         self.judge_what_is_there(part);
@@ -243,7 +242,7 @@ impl<'a> Scheduler<'a> {
         self.forecast.look_at_noise(self.state, pool, seconds);
     }
 
-    /// All tiles of a part that have fewer samples than `target`.
+    /// Renders all tiles of `part` that have fewer samples than `target`.
     fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
         let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None, 0) };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
@@ -251,7 +250,7 @@ impl<'a> Scheduler<'a> {
             let at_once = samples..target.min(samples.saturating_add(photons.at_once()));
             let numbers = self.state.numbers(at_once);
             let end = samples + numbers.len() as u32;
-            // Photons that no time is left for are not sent, nor gathered.
+            // Do not trace or gather photons for which there is no time.
             self.tick();
             if self.is_over_time {
                 break;
@@ -265,19 +264,20 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// The photons of some samples; orders are heard while they are sent.
+    /// Traces the photons of some samples while handling orders.
     fn maps(&mut self, photons: &PhotonStore, samples: Range<u32>) -> Result<PhotonMaps, Stop> {
         let Rendering { plan, sink, tracer, .. } = *self.rendering;
         let Tracer { pool, world, token, .. } = tracer;
         let begin = self.clock.seconds(token.is_paused());
         self.forecast.begin_photons(begin);
-        let maps = photons.maps(samples, Sending { world, plan, pool, token, sink }, || self.tick())?;
+        let maps = photons.maps(samples, PhotonContext { world, plan, pool, token, sink }, || self.tick())?;
         self.forecast.end_photons(self.clock.seconds(token.is_paused()));
         Ok(maps)
     }
 
-    /// Next samples of each half of each cell, under a budget of time: more where they lower the error most. `None` with photons,
-    /// which cost as much for one cell as for all, and with a noise threshold, which places samples by itself.
+    /// Returns the next samples of each half of each cell under a time limit: more where they reduce the error most.
+    /// Returns `None` with photons, which cost the same for one cell as for all, and with a noise target, which places
+    /// samples itself.
     fn next_round(&self) -> Option<Vec<[u32; 2]>> {
         let Rendering { plan, photons, .. } = *self.rendering;
         let Render { samples, error, .. } = plan.settings.render;
@@ -287,7 +287,7 @@ impl<'a> Scheduler<'a> {
         next_round(&self.state.film, &self.state.done, &self.state.rays, samples)
     }
 
-    /// Bring the halves of all cells to these samples, in steps that are short.
+    /// Brings the halves of all cells to these samples in short steps.
     fn round(&mut self, goals: &[[u32; 2]]) -> Result<(), Stop> {
         const STEP: Duration = Duration::from_millis(30);
         /// Pixels of half a tile.
@@ -339,7 +339,7 @@ impl<'a> Scheduler<'a> {
         Ok(())
     }
 
-    /// Does all that is due between two tiles: progress, previews, orders, the budget of time.
+    /// Handles everything that is due between two tiles: progress, previews, orders, checkpoints and the time limit.
     fn tick(&mut self) {
         let now = Instant::now();
         if now >= self.next_progress {
@@ -354,9 +354,9 @@ impl<'a> Scheduler<'a> {
         }
         (self.rendering.pulse)(self.state, !self.is_first);
         let seconds = self.seconds();
-        if let Some(keeping) = self.rendering.keeping {
+        if let Some(checkpointer) = self.rendering.checkpointer {
             let rendered = self.rendered_seconds();
-            keeping.tick(self.state, self.traced(), rendered);
+            checkpointer.tick(self.state, self.traced(), rendered);
         }
         let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
@@ -368,7 +368,7 @@ impl<'a> Scheduler<'a> {
         self.next_preview = Instant::now() + PREVIEW_INTERVAL;
     }
 
-    /// Tells how far the render is, and when it is expected to end.
+    /// Reports the progress of the render and its expected end.
     fn report_progress(&mut self, is_last: bool) {
         let elapsed_seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
         let Rendering { plan, photons, sink, .. } = *self.rendering;
@@ -382,7 +382,7 @@ impl<'a> Scheduler<'a> {
         FirstPictures { tracer, plan, is_moved, rate }
     }
 
-    /// Traces first pictures with one sample a pixel, if they are much less work than one pass.
+    /// Traces first images with one sample per pixel, if they are much less work than a pass.
     fn coarse(&mut self) -> Result<(), Stop> {
         let Some(shown) = self.screen.size() else { return Ok(()) };
         let coarse = self.first_pictures();

@@ -1,31 +1,33 @@
-//! The share of a picture that one of several processes renders.
+//! The share of an image that one of several processes renders.
 //!
-//! Tiles with all their samples are dealt; with photons, whose passes are dear, blocks of samples are, for all tiles. If there are
-//! more shares than blocks, the tiles of a block are dealt among several. The order in which they are dealt is scrambled, so that
-//! shares cost about the same, and fixed, so that each process knows its own.
+//! Shares consist of tiles with all their samples. With photons, whose passes are expensive, they consist of blocks of
+//! samples of all tiles, and if there are more shares than blocks, the tiles of a block are divided among several
+//! shares. The order of assignment is scrambled, so that shares cost about the same, and fixed, so that each process
+//! knows its own.
 
 use std::ops::Range;
 
 use crate::film::{BLOCK_SIZE, SumOrder};
 use crate::math::random::hash;
 
-/// A share of a picture.
+/// A share of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Share {
-    /// From 1.
+    /// Index of the share, from 1.
     pub(crate) index: u32,
     /// Number of shares.
     pub(crate) count: u32,
-    /// Samples of a pixel in the whole picture.
+    /// Samples per pixel of the whole image.
     pub(crate) samples: u32,
-    /// Its blocks of samples. `None` if its tiles have all their samples.
+    /// Sample blocks of this share. `None` if its tiles have all their samples.
     blocks: Option<Vec<u32>>,
-    /// Place among those who share the tiles, and their number.
+    /// Index among the shares that divide the tiles, and their number.
     of_tiles: (u32, u32),
 }
 
 impl Share {
-    /// One share of so many of a picture with so many samples; `has_photons` if passes of photons are dealt.
+    /// Creates one of several shares of an image with `samples` samples. `has_photons` selects division by passes of
+    /// photons.
     pub(crate) fn new((index, count): (u32, u32), has_photons: bool, samples: u32) -> Self {
         let number = index - 1;
         if !has_photons {
@@ -44,7 +46,7 @@ impl Share {
         Self { index, count, samples, blocks: Some(blocks), of_tiles }
     }
 
-    /// Samples that each of its pixels gets.
+    /// Returns the samples per pixel of this share.
     pub(crate) fn own_samples(&self) -> u32 {
         match &self.blocks {
             None => self.samples,
@@ -52,7 +54,7 @@ impl Share {
         }
     }
 
-    /// Numbers of the first of these samples of a pixel of its own, up to the end of their block.
+    /// Returns the indices in the whole image of this share's samples `own`, up to the end of their block.
     pub(crate) fn numbers(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
         let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
@@ -60,7 +62,7 @@ impl Share {
         start..(start + (own.end - own.start)).min(block * BLOCK_SIZE + self.length(*block))
     }
 
-    /// Order in which its samples are added up.
+    /// Returns the order in which samples are summed.
     pub(crate) fn sums(&self) -> SumOrder {
         match &self.blocks {
             None => SumOrder::Sequential,
@@ -70,17 +72,17 @@ impl Share {
         }
     }
 
-    /// Its blocks, in their order; none if it has tiles with all their samples.
+    /// Returns the sorted blocks of this share. Empty if it consists of tiles with all their samples.
     pub(crate) fn blocks(&self) -> &[u32] {
         self.blocks.as_deref().unwrap_or_default()
     }
 
-    /// Number of blocks in the picture; 0 if tiles have all their samples.
+    /// Returns the number of blocks in the image. 0 if shares consist of tiles.
     pub(crate) fn block_count(&self) -> u32 {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
 
-    /// Whether each of so many tiles is its own.
+    /// Returns for each of `count` tiles whether it belongs to this share.
     pub(crate) fn tiles(&self, count: usize) -> Vec<bool> {
         let (place, of) = self.of_tiles;
         let mut own = vec![false; count];
@@ -90,13 +92,13 @@ impl Share {
         own
     }
 
-    /// Samples of a block.
+    /// Returns the number of samples in a block.
     fn length(&self, block: u32) -> u32 {
         (self.samples - block * BLOCK_SIZE).min(BLOCK_SIZE)
     }
 }
 
-/// Numbers below `count` in the order in which they are dealt.
+/// Returns the numbers below `count` in order of assignment.
 fn dealt(count: u32) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
     order.sort_by_key(|number| (hash(u64::from(*number)), *number));
@@ -109,9 +111,9 @@ mod tests {
 
     use super::*;
 
-    /// Every tile has every sample in one share, and in no other.
+    /// Every sample of every tile is in exactly one share.
     #[test]
-    fn shares_are_the_whole_and_none_has_what_another_has() {
+    fn shares_partition_the_samples() {
         for (samples, tiles) in [(1, 1), (16, 6), (250, 7), (256, 40)] {
             for count in [1, 2, 3, 8, 64, 100] {
                 for has_photons in [false, true] {
@@ -139,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn the_blocks_of_a_share_lie_all_over_the_picture() {
+    fn blocks_of_a_share_are_spread() {
         let share = Share::new((1, 2), true, 4096);
         let first = share.blocks().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");

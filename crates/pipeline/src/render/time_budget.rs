@@ -1,31 +1,32 @@
-//! Placement of samples under a budget of time: where they lower the error of the picture most.
+//! Placement of samples within a time limit, where they reduce the error of the image most.
 //!
-//! The parts of a picture are the two halves of each cell. A round doubles the samples of parts, beginning with those whose error
-//! falls most for each sample. Between powers of two the points of a pixel leave gaps: there a third more samples may be worth nothing.
+//! The units are the two halves of each cell. A round doubles the samples of halves, starting with those whose error
+//! decreases most per sample. Between powers of two the sample points of a pixel have gaps, where a third more samples
+//! may be worth nothing.
 //!
-//! Rare bright samples must not bring more samples to the place where they were met: the picture would be too dark. As in
-//! [`super::noise_goals`], one half goes by the noise of the other half, estimated from the samples alone that every half has: how
-//! many more the other half has depends on the first half's noise.
+//! Rare bright samples must not attract more samples to where they occur, which would make the image too dark. As in
+//! [`super::noise_goals`], one half follows the noise of the other half, estimated only from the samples that every
+//! half has, because any further samples of the other half depend on the first half's noise.
 
 use crate::film::Film;
 
-/// Samples before which noise is not asked for.
+/// Minimum number of samples for noise estimates.
 const LEAST: u32 = 16;
 
-/// The part of the mean number of samples that every pixel has: these tell of its noise.
+/// Fraction of the mean number of samples that every pixel gets, for estimating its noise.
 const SHARE: f64 = 1.0 / 8.0;
 
-/// Work of a round before noise is measured again, as a part of the work before.
+/// Work of a round before noise is measured again, relative to all earlier work.
 const ROUND: f64 = 0.4;
 
-/// Cost of a sample beside its rays, in rays.
+/// Cost of a sample apart from its rays, in rays.
 const BESIDE: f64 = 1.0;
 
-/// Samples that the halves of each cell are to have next, at most `most`, by their samples so far and the rays of these. `None`
-/// while it is too early to tell.
+/// Returns the next samples of the halves of each cell, at most `most`, from their current samples and rays. Returns
+/// `None` while it is too early to decide.
 pub(crate) fn next_round(film: &Film, done: &[[u32; 2]], rays: &[u64], most: u32) -> Option<Vec<[u32; 2]>> {
     let least = done.as_flattened().iter().copied().min().filter(|least| *least >= LEAST.min(most))?;
-    // Every half has had these, whatever the goals were.
+    // Every half has at least these samples, whatever the goals were.
     let known = 1 << least.ilog2();
     let halves = halves(film, done, rays, (known, most))?;
     let pixels: f64 = halves.iter().map(|half| half.pixels).sum();
@@ -50,13 +51,13 @@ struct Half {
     half: usize,
     pixels: f64,
     samples: u32,
-    /// Samples that it is to have next.
+    /// Next number of samples.
     goal: u32,
-    /// Sum of the squared errors of its pixels, each with one sample.
+    /// Sum of the squared errors of its pixels with one sample each.
     error: f64,
-    /// Exponent p: the error falls with the number of samples to the power −p.
+    /// Exponent p: the error decreases with the number of samples to the power −p.
     power: f64,
-    /// Cost of a sample, in rays.
+    /// Cost of a sample in rays.
     cost: f64,
 }
 
@@ -65,7 +66,7 @@ impl Half {
         self.pixels * f64::from(samples) * self.cost
     }
 
-    /// Fall of the sum of squared errors per cost of a sample, if pixels have `mean` samples on average.
+    /// Returns the decrease of the sum of squared errors per cost of a sample. `mean` is the average number of samples.
     fn urgency(&self, mean: f64) -> f64 {
         if f64::from(self.samples) < SHARE * mean {
             return f64::INFINITY;
@@ -103,10 +104,10 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Columns and rows of a cell.
+    /// Width and height of a cell.
     const SIDE: u32 = crate::film::CELL_SIZE;
 
-    /// Add samples to a half of a cell.
+    /// Adds samples to a half of a cell.
     fn add(film: &Film, (cell, half): (usize, usize), samples: u32, mut sample: impl FnMut() -> f32) {
         let rect = film.cell_rect(cell).expect("a cell");
         let pixels = Pixels { rect, part: PixelSubset::Half(half) };
@@ -114,7 +115,7 @@ mod tests {
         film.add(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
     }
 
-    /// Some cells in a row, of whose halves each has samples around 1 of a spread.
+    /// Creates a row of cells whose halves have samples around 1 with a given spread.
     fn film(spreads: &[[f32; 2]], samples: u32) -> (Film, Vec<[u32; 2]>) {
         let film = Film::new(SIDE * spreads.len() as u32, SIDE, None).expect("a film");
         let mut next = unit(7);
@@ -128,34 +129,34 @@ mod tests {
         (film, done)
     }
 
-    /// Numbers of the cells that have pixels, from left to right.
+    /// Returns the cells that have pixels, from left to right.
     fn cells(film: &Film) -> Vec<usize> {
         (0..film.cell_count()).filter(|cell| film.cell_rect(*cell).is_some()).collect()
     }
 
-    /// Goals of the next round of those.
+    /// Returns the goals of the next round for these cells.
     fn round(film: &Film, done: &[[u32; 2]], most: u32) -> Option<Vec<[u32; 2]>> {
         let goals = next_round(film, done, &vec![0; done.len()], most)?;
         Some(cells(film).into_iter().map(|cell| goals[cell]).collect())
     }
 
     #[test]
-    fn what_is_noisy_comes_first_by_the_noise_of_the_other_half() {
+    fn noise_of_the_other_half_decides_the_order() {
         let (film, done) = film(&[[0.2; 2], [1.0, 0.05], [0.2; 2]], 16);
         assert_eq!(round(&film, &done, 1000).expect("a round")[1], [16, 32]);
-        assert_eq!(round(&film, &done, 20).expect("a round")[1][1], 20, "no more than asked for");
+        assert_eq!(round(&film, &done, 20).expect("a round")[1][1], 20, "at most the requested samples");
     }
 
     #[test]
-    fn a_round_is_a_part_of_what_was_done() {
+    fn round_is_a_fraction_of_earlier_work() {
         let (film, done) = film(&[[1.0; 2]; 8], 32);
         let goals = round(&film, &done, 1000).expect("a round");
         let more: u32 = goals.as_flattened().iter().map(|goal| goal - 32).sum();
-        assert_eq!(more, 7 * 32, "seven of sixteen halves twice as many");
+        assert_eq!(more, 7 * 32, "seven of sixteen halves are doubled");
     }
 
     #[test]
-    fn what_has_few_samples_comes_first_though_it_has_no_noise() {
+    fn cells_with_few_samples_come_first() {
         let (film, mut done) = film(&[[0.0; 2], [1.0; 2], [1.0; 2]], 16);
         for &cell in &cells(&film)[1..] {
             for half in 0..2 {
@@ -167,29 +168,30 @@ mod tests {
     }
 
     #[test]
-    fn of_two_that_are_as_noisy_the_cheaper_one_comes_first() {
+    fn cheaper_of_equally_noisy_cells_comes_first() {
         let (film, done) = film(&[[1.0; 2]; 2], 16);
-        let dear = cells(&film)[0];
+        let expensive = cells(&film)[0];
         let rays: Vec<u64> =
-            (0..done.len()).map(|cell| if cell == dear { 100_000 } else { 10_000 }).collect();
+            (0..done.len()).map(|cell| if cell == expensive { 100_000 } else { 10_000 }).collect();
         let goals = next_round(&film, &done, &rays, 1000).expect("a round");
         assert_eq!(cells(&film).into_iter().map(|cell| goals[cell]).collect::<Vec<_>>()[1], [32; 2]);
     }
 
     #[test]
-    fn nothing_is_told_before_there_are_samples_enough() {
+    fn no_round_without_enough_samples() {
         let (film, done) = film(&[[1.0; 2]; 2], 8);
         assert_eq!(round(&film, &done, 1000), None);
         let (film, done) = self::film(&[[1.0; 2]; 2], 16);
-        assert_eq!(round(&film, &done, 16), Some(vec![[16; 2]; 2]), "all is done");
+        assert_eq!(round(&film, &done, 16), Some(vec![[16; 2]; 2]), "all samples are done");
     }
 
-    /// The mean of many cells of rare bright samples, 1 in the long run, after some rounds; or where each half goes by its own noise.
-    /// With few cells, samples that one gets would be missing in the others.
+    /// Returns the mean of many cells with rare bright samples, whose expected value is 1, after some rounds that
+    /// follow the noise of the other half or of the same half (`by_own`). With few cells, samples that one gets would
+    /// be missing in the others.
     fn rendered(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
         const CHANCE: f64 = 0.002;
         let film = Film::new(64 * SIDE, 1, None).expect("a film");
-        // The number of dark samples before a bright one has the distribution of Bernoulli trials, without a draw for each of them.
+        // Sample the number of dark samples before a bright one directly, instead of one Bernoulli trial per sample.
         let mut gap = || (f64::from(1.0 - next()).ln() / (1.0 - CHANCE).ln()) as usize;
         let mut left = gap();
         let mut sample = || {
@@ -209,7 +211,7 @@ mod tests {
             let before = done.clone();
             for &(cell, half) in &places {
                 let of = if by_own { 1 - half } else { half };
-                // As many times more, as the halves do not go together then.
+                // Multiply the samples, because the halves differ in this mode.
                 let samples = before[cell][half] * (goals[cell][of] / before[cell][of] - 1);
                 add(&film, (cell, half), samples, &mut sample);
                 done[cell][half] += samples;
@@ -219,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_that_go_by_the_noise_of_the_other_half_keep_the_mean() {
+    fn placement_by_the_other_half_is_unbiased() {
         let mut next = unit(13);
         let mut mean_of = |by_own| {
             const RENDERS: u32 = 1500;
@@ -232,6 +234,6 @@ mod tests {
         let (own, own_error) = mean_of(true);
         assert!(error.max(own_error) < 0.006, "{error} {own_error}");
         assert!((mean - 1.0).abs() < 0.02, "{mean} ± {error}");
-        assert!(own < 0.95, "the samples tell what goes by itself: {own} ± {own_error}");
+        assert!(own < 0.95, "following its own noise is biased: {own} ± {own_error}");
     }
 }

@@ -1,4 +1,4 @@
-//! The report of a finished request: made from its results, and written to its file.
+//! Creation and writing of reports.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ pub(crate) struct Finished<'a> {
     pub(crate) scene: &'a Path,
     pub(crate) plan: &'a Plan,
     pub(crate) world: &'a World,
-    pub(crate) canvas: &'a FilmState,
+    pub(crate) state: &'a FilmState,
     pub(crate) films: &'a FilmCache,
     pub(crate) rays: RayCounters,
     pub(crate) texels_loaded: u64,
@@ -47,10 +47,10 @@ pub(crate) fn report(finished: &Finished<'_>, stages: Vec<StageReport>, seconds:
     }
 }
 
-/// Write it where the plan says.
+/// Writes a report to the file of the plan.
 ///
 /// # Errors
-/// Why not, with the file's name.
+/// Errors of writing, with the file name.
 pub(crate) fn write_report(
     plan: &Plan,
     inputs: &Inputs,
@@ -62,14 +62,15 @@ pub(crate) fn write_report(
     let unwritable =
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
-    let target = (Target::report(path), None);
+    let target = (OutputTarget::report(path), None);
     guarded(plan, inputs, target, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
 }
 
-/// Removes the report of an earlier image, where an unfinished image took its place. Leaves files that a report must not replace.
+/// Removes the report of an earlier image that an unfinished image has replaced. Keeps files that a report must not
+/// replace.
 ///
 /// # Errors
-/// Why not, with the file's name.
+/// Errors of removing, with the file name.
 pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result<(), OutputError> {
     let Some(path) = plan.report.as_ref().filter(|path| path.is_file()) else { return Ok(()) };
     let failed = |source| OutputError::File { path: path.clone(), source };
@@ -78,12 +79,12 @@ pub(crate) fn remove_report(plan: &Plan, inputs: &Inputs, sink: &Sink) -> Result
         (guard.may_replace)(&real)?;
         std::fs::remove_file(&real).map_err(failed)
     };
-    guarded(plan, inputs, (Target::report(path), None), sink, remove)
+    guarded(plan, inputs, (OutputTarget::report(path), None), sink, remove)
 }
 
 fn image(finished: &Finished<'_>) -> ImageReport {
     let plan = finished.plan;
-    let samples = finished.canvas.film.samples();
+    let samples = finished.state.film.samples();
     let outputs: &[PathBuf] = if finished.is_written { &plan.outputs } else { &[] };
     let paths: Vec<String> = outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
     ImageReport {
@@ -92,9 +93,9 @@ fn image(finished: &Finished<'_>) -> ImageReport {
         width: plan.settings.render.width,
         height: plan.settings.render.height,
         samples: SampleCounts { min: samples.min, mean: samples.mean, max: samples.max },
-        error: finished.canvas.film.relative_error(),
-        render_seconds: finished.canvas.render_seconds,
-        complete: finished.canvas.is_complete(plan.settings.render.samples),
+        error: finished.state.film.relative_error(),
+        render_seconds: finished.state.render_seconds,
+        complete: finished.state.is_complete(plan.settings.render.samples),
         range: range(finished),
     }
 }
@@ -119,11 +120,11 @@ fn lights(finished: &Finished<'_>) -> LightsReport {
 }
 
 fn range(finished: &Finished<'_>) -> Option<[f32; 2]> {
-    let Finished { plan, canvas, .. } = finished;
+    let Finished { plan, state, .. } = finished;
     if plan.tone.range_map == RangeMap::None {
         return None;
     }
-    let image = canvas.film.image(plan.settings.view.quantity());
+    let image = state.film.image(plan.settings.view.quantity());
     plan.tone.resolved_for(&image).range_map.range().map(|range| range.limits())
 }
 
@@ -142,26 +143,27 @@ fn counters(finished: &Finished<'_>) -> Counters {
         texels_loaded: finished.texels_loaded,
         texture_memory_bytes: finished.texture_memory_bytes,
         texture_lookups: rays.texture_lookups + finished.photons.map_or(0, |photons| photons.lookups),
-        non_finite_samples: finished.canvas.film.non_finite_samples(),
+        non_finite_samples: finished.state.film.non_finite_samples(),
         accel_memory_bytes: world.accel_memory_bytes() as u64,
         films: finished.films.count() as u64,
         film_memory_bytes: finished.films.memory_bytes(),
     }
 }
 
-/// Highest resident memory of the process so far; 0 if the system does not tell it.
+/// Peak resident memory of the process in bytes. 0 if unknown.
 fn peak_memory_bytes() -> u64 {
     peak_of_program().unwrap_or_else(peak_of_process)
 }
 
-/// Highest resident memory of this program alone, if the system tells it (proc_pid_status(5)).
+/// Peak resident memory of this program, if the system reports it (proc_pid_status(5)).
 fn peak_of_program() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?;
     Some(kibibytes.trim().parse::<u64>().ok()? * 1024)
 }
 
-/// Highest resident memory with that of the process before it became this program: the caller of glimt may have used much.
+/// Peak resident memory, including the time before the process executed this program, when the caller of glimt may
+/// have used much.
 fn peak_of_process() -> u64 {
     use nix::sys::resource::{UsageWho, getrusage};
     // Bytes on macOS, kibibytes elsewhere (getrusage(2)).

@@ -1,13 +1,13 @@
-//! Marks that tell a report from other JSON.
+//! Recognition of reports among JSON files.
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
 use crate::protocol::Stage;
 
-/// The keys that a report has in every version; nobody writes all of them by hand.
+/// Keys that reports of all versions have, and that other JSON files do not have together.
 #[derive(Deserialize)]
-pub(crate) struct Marks {
+pub(crate) struct ReportMarks {
     #[serde(rename = "glimt")]
     _version: String,
     #[serde(rename = "scene")]
@@ -30,8 +30,8 @@ struct StageMark {
     name: String,
 }
 
-impl Marks {
-    /// Whether its stages are those of a render.
+impl ReportMarks {
+    /// Whether the report has all stages of a render.
     pub(crate) fn have_all_stages(&self) -> bool {
         self.stages.iter().map(|stage| stage.name.as_str()).eq(Stage::ALL.map(Stage::name))
     }

@@ -1,10 +1,11 @@
-//! Trees: one per mesh file, kept while the file's content is the same, and the one over all objects; those of scenes before while
-//! there is room.
+//! The accel stage: one tree per mesh file, kept while its content is the same, and one over all objects. Trees of
+//! previous scenes are kept while there is room.
 
 use std::sync::Arc;
 
-use super::super::cache::{Memo, Pool, Spare};
+use super::super::cache::{EvictionCandidate, Memo, Pool};
 use super::super::keys;
+use super::super::protocol::reasons;
 use super::meshes::Meshes;
 use super::{Reading, Staged, Stop};
 use crate::math::DVec3;
@@ -12,14 +13,14 @@ use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{Geometry, MeshTree, light_lifts, with_lifted_lights};
 
-/// Cache of the stage.
+/// Cache of the accel stage.
 #[derive(Debug, Default)]
 pub(crate) struct AccelCache {
     trees: Pool<Key, MeshTree>,
     geometry: Pool<Key, Geometry>,
-    /// Translations of lights in the plane of other surfaces.
+    /// Offsets of lights that are coplanar with other surfaces.
     lifts: Memo<Vec<DVec3>>,
-    /// Key of the last tree over all objects.
+    /// Key of the current tree over all objects.
     last: Option<Key>,
 }
 
@@ -29,8 +30,8 @@ impl AccelCache {
         self.geometry.end(success, request);
     }
 
-    pub(crate) fn spares(&self) -> impl Iterator<Item = Spare> {
-        self.trees.spares().chain(self.geometry.spares())
+    pub(crate) fn eviction_candidates(&self) -> impl Iterator<Item = EvictionCandidate> {
+        self.trees.eviction_candidates().chain(self.geometry.eviction_candidates())
     }
 
     pub(crate) fn drop_before(&mut self, request: u64) {
@@ -38,33 +39,33 @@ impl AccelCache {
         self.geometry.drop_before(request);
     }
 
-    /// The geometry that was built or found last.
+    /// Returns the geometry built or reused last.
     #[cfg(test)]
     pub(crate) fn latest(&self) -> Option<&Arc<Geometry>> {
         self.geometry.latest(&self.last?)
     }
 }
 
-/// Result of the stage.
+/// Result of the accel stage.
 #[derive(Clone)]
-pub(crate) struct Built {
-    /// One for each of the scene's mesh files.
+pub(crate) struct AccelResult {
+    /// Trees of the scene's mesh files.
     pub(crate) meshes: Vec<Arc<MeshTree>>,
-    /// All objects.
+    /// Tree over all objects.
     pub(crate) geometry: Arc<Geometry>,
 }
 
-/// Build what is missing, in coordinates that start at `origin`. `scene` has the overrides in it.
+/// Builds the missing trees, in coordinates relative to `origin`. `scene` includes the overrides.
 ///
 /// # Errors
-/// Cancelled.
+/// [`Stop::Cancelled`].
 pub(crate) fn accel(
     scene: &Scene,
     (of, origin): (&Referents<'_>, DVec3),
     meshes: &Meshes,
     cache: &mut AccelCache,
     reading: &Reading<'_>,
-) -> Result<Staged<Built>, Stop> {
+) -> Result<Staged<AccelResult>, Stop> {
     let (meshes, kept) = trees(scene, meshes, cache, reading)?;
     let lights_key = keys::from(&keys::coplanar(scene, of), origin);
     let lifts = cache.lifts.get(lights_key).cloned().unwrap_or_else(|| light_lifts(scene, &meshes, origin));
@@ -73,17 +74,17 @@ pub(crate) fn accel(
     let is_last = cache.last == Some(key);
     if let Some(geometry) = cache.geometry.get(&key, key) {
         cache.last = Some(key);
-        let why = if is_last { "no shape changed" } else { "its trees were kept" };
-        return Ok(Staged::reused(Built { meshes, geometry }, why));
+        let why = if is_last { reasons::UNCHANGED } else { reasons::CACHED };
+        return Ok(Staged::reused(AccelResult { meshes, geometry }, why));
     }
     let build = || Geometry::lifted(scene, &meshes, (origin, lifts), reading.token);
     let geometry = Arc::new(reading.pool.install(build)?);
     cache.geometry.insert(key, key, (geometry.clone(), geometry.own_memory_bytes()));
     cache.last = Some(key);
     let built = meshes.len() - kept;
-    let value = Built { meshes, geometry };
+    let value = AccelResult { meshes, geometry };
     Ok(match (scene.objects.is_empty(), kept) {
-        (true, _) => Staged::skipped(value, "the scene has no shape"),
+        (true, _) => Staged::skipped(value, reasons::NO_SHAPES),
         (false, 0) => Staged::done(value, ""),
         (false, _) => {
             Staged::done(value, format!("{built} mesh trees built, {kept} kept, one over all objects"))
@@ -91,7 +92,7 @@ pub(crate) fn accel(
     })
 }
 
-/// The trees of all meshes, and how many were kept from before.
+/// Returns the trees of all meshes, and how many of them were cached.
 fn trees(
     scene: &Scene,
     meshes: &Meshes,
@@ -112,7 +113,7 @@ fn trees(
                 let loaded = with_lifted_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
                 let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
-                // The tree holds its mesh, also when that is read anew.
+                // The tree keeps its mesh alive even after the file is read again.
                 let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();
                 cache.trees.insert(key, key, (tree.clone(), bytes));
                 tree

@@ -1,4 +1,4 @@
-//! glTF files that a request has open: each is read once, however many parts and images the scene names.
+//! glTF files opened by a request. Each is read once, however many parts and images the scene uses.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -9,22 +9,22 @@ use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, ignore_progress};
 
-/// The slot of a file, which is filled by whoever needs it first.
+/// Slot of a file, filled by the first user.
 type Slot = Arc<Mutex<Option<Arc<Container>>>>;
 
-/// Open glTF files, and meshes that were read ahead.
+/// Open glTF files, and meshes that were read early.
 #[derive(Debug, Default)]
 pub(crate) struct Containers {
     gltf: Mutex<HashMap<PathBuf, Slot>>,
-    /// Meshes that were read before the stage that needs them, each for one who asks.
+    /// Meshes read before the stage that needs them; each is handed out once.
     ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
 }
 
 impl Containers {
-    /// The open file of a path.
+    /// Returns the open file, and opens it if necessary.
     ///
     /// # Errors
-    /// As for [`Container::open`]; the next call tries again.
+    /// As for [`Container::open`]. The next call tries again.
     pub(crate) fn open(
         &self,
         path: &Path,
@@ -44,7 +44,7 @@ impl Containers {
         Ok(container)
     }
 
-    /// A mesh file, or a part of a glTF file. The whole of a glTF file is its scene as one mesh.
+    /// Reads a mesh file, or one part or all of a glTF file as a single mesh.
     pub(crate) fn mesh(
         &self,
         (path, part): (&Path, Option<u32>),
@@ -62,12 +62,12 @@ impl Containers {
         }
     }
 
-    /// Keeps a mesh that [`Containers::mesh`] has given for whoever asks for it next.
+    /// Keeps a mesh from [`Containers::mesh`] for the next caller.
     pub(crate) fn keep(&self, path: &Path, mesh: LoadedMesh) {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }
 
-    /// The bytes of an image of a glTF file, or the file that holds them, and the hash of the glTF file.
+    /// Returns the bytes of an image of a glTF file, or the file that contains them, and the hash of the glTF file.
     pub(crate) fn image(
         &self,
         (path, number): (&Path, u32),
@@ -87,11 +87,11 @@ impl Containers {
 pub(crate) enum ImageInput {
     /// An image file.
     File(PathBuf),
-    /// Bytes of another file.
+    /// Bytes embedded in another file.
     Bytes(Arc<[u8]>),
 }
 
-/// One file by whatever name; a name that leads nowhere stands for itself.
+/// Canonicalizes a path, so that all names of a file are equal. Returns a nonexistent path unchanged.
 pub(super) fn canonical(path: &Path) -> PathBuf {
     path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

@@ -1,4 +1,4 @@
-//! Warnings of lights in the plane of other surfaces.
+//! Warnings about lights that are coplanar with other surfaces.
 
 use super::super::cache::Memo;
 use super::super::keys;
@@ -12,10 +12,11 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::Key;
 use crate::world::{Coplanar, coplanar_lights};
 
-/// Most lights that are warned of.
+/// Maximum number of lights with a warning.
 const MOST: usize = 10;
 
-/// Warns of the lights that are moved off the plane of another surface, unless shapes and lights are as they were.
+/// Warns about lights that are moved off the plane of another surface. Reuses the search if shapes and lights are
+/// unchanged.
 pub(crate) fn coplanar(
     loaded: &Loaded,
     meshes: &Meshes,
@@ -37,9 +38,9 @@ pub(crate) fn coplanar(
     for of_light in found.chunk_by(|a, b| a.light == b.light).take(MOST) {
         let [Coplanar { light, surface, .. }, others @ ..] = of_light else { continue };
         let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
-        let other = if surface == light { "other faces of its file".to_owned() } else { named(*surface) };
+        let other = if surface == light { "other faces of its mesh".to_owned() } else { named(*surface) };
         let message = format!("this light is in the plane of {other}{more}");
-        let help = "it is rendered a hair in front of it; move it off the plane to choose the distance";
+        let help = "glimt renders it slightly in front; move it off the plane to choose the distance";
         let span = scene.objects[*light].span.clone();
         findings.warnings.push(loaded.diagnostic_at(span, Severity::Warning, message, Some(help.to_owned())));
     }

@@ -1,4 +1,4 @@
-//! The bodies of glass: which of its surfaces are one, and which have holes.
+//! Detection of glass solids, with warnings about open ones.
 
 use std::sync::Arc;
 
@@ -14,14 +14,14 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
 use crate::world::{GlassSolids, OpenGlass};
 
-/// Flaw of the picture where glass is open, under the place of the object.
-const LACKS: &str = "glass refracts where a ray goes in and where it comes out; no ray that comes through the hole \
-                     is refracted or tinted";
+/// Visible effect of open glass, shown under the object's location.
+const LACKS: &str = "glass refracts where a ray enters and leaves it; rays through the hole are neither refracted \
+                     nor tinted";
 
-/// Finds the bodies, unless shapes and materials are as they were; warns about those that are open.
+/// Finds the glass solids, or reuses them if shapes and materials are unchanged, and warns about open ones.
 ///
 /// # Errors
-/// Cancelled.
+/// [`Stop::Cancelled`].
 pub(crate) fn glass(
     loaded: &Loaded,
     meshes: &Meshes,
@@ -44,23 +44,23 @@ pub(crate) fn glass(
     Ok(bodies)
 }
 
-/// A flaw that several objects may share: one warning is about all of them.
+/// A flaw that several objects may share. Each flaw causes one warning.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Flaw {
-    /// A shape that has no inside.
+enum GlassFlaw {
+    /// A shape without an interior.
     Sheet { one: &'static str, several: &'static str, help: &'static str },
-    /// A mesh of which a part is missing.
+    /// A mesh with a hole.
     Hole,
-    /// A mesh whose faces disagree about the front.
+    /// A mesh with inconsistently oriented faces.
     Fronts,
 }
 
-/// Most objects that a warning names.
+/// Maximum number of objects that a warning names.
 const MOST_NAMES: usize = 5;
 
-/// Warnings about glass with holes, one for each flaw, at its first object. Glass whose holes opaque surfaces surround is fine.
+/// Returns one warning per flaw, at the first object with it. Glass whose holes are covered by opaque surfaces is fine.
 fn warnings_of_open(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
-    let mut groups: Vec<(Flaw, Vec<&OpenGlass>)> = Vec::new();
+    let mut groups: Vec<(GlassFlaw, Vec<&OpenGlass>)> = Vec::new();
     for open in open.iter().filter(|open| !open.is_covered) {
         let Some(flaw) = flaw(loaded, open) else { continue };
         match groups.iter_mut().find(|(other, _)| *other == flaw) {
@@ -71,52 +71,52 @@ fn warnings_of_open(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
     groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
 }
 
-/// The flaw of an open object.
-fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<Flaw> {
+/// Returns the flaw of an open object.
+fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.mesh().is_some() {
-        return Some(if open.disagrees { Flaw::Fronts } else { Flaw::Hole });
+        return Some(if open.disagrees { GlassFlaw::Fronts } else { GlassFlaw::Hole });
     }
-    let sheet = |one, several, help| Flaw::Sheet { one, several, help };
+    let sheet = |one, several, help| GlassFlaw::Sheet { one, several, help };
     Some(match shape.sheet()? {
         Sheet::Quad(_) => {
-            sheet("a quad", "quads", "use a thin [[box]] for a pane, or close it by other glass")
+            sheet("a quad", "quads", "use a thin [[box]] for a pane, or close it with other glass")
         }
         Sheet::Triangle(_) => sheet("a triangle", "triangles", "use a [[box]], or a closed [[mesh]]"),
         Sheet::Disk { .. } => sheet("a disk", "disks", "use a flat [[cylinder]] for a round pane"),
-        Sheet::Cylinder { .. } => sheet("an open cylinder", "open cylinders", "close it by `caps = true`"),
-        Sheet::Cone { .. } => sheet("an open cone", "open cones", "close it by `cap = true`"),
+        Sheet::Cylinder { .. } => sheet("an open cylinder", "open cylinders", "close it with `caps = true`"),
+        Sheet::Cone { .. } => sheet("an open cone", "open cones", "close it with `cap = true`"),
     })
 }
 
-/// The warning about objects with this flaw; there is at least one.
-fn warning(loaded: &Loaded, flaw: Flaw, members: &[&OpenGlass]) -> Diagnostic {
+/// Returns the warning about all objects with a flaw. `members` is not empty.
+fn warning(loaded: &Loaded, flaw: GlassFlaw, members: &[&OpenGlass]) -> Diagnostic {
     let first = &loaded.scene.objects[members[0].object as usize];
     let edges: usize = members.iter().map(|open| open.edges).sum();
     let edges = if edges == 1 { "1 edge".to_owned() } else { format!("{edges} edges") };
     let part = percent(members.iter().map(|open| open.missing).fold(0.0, f64::max));
     let (count, names) = (members.len(), names(loaded, members));
     let mesh = match (count, &first.name) {
-        (1, Some(name)) => format!("mesh \"{name}\" of glass is"),
-        (1, None) => "mesh of glass is".to_owned(),
-        (_, _) => format!("{count} meshes of glass are"),
+        (1, Some(name)) => format!("glass mesh \"{name}\" is"),
+        (1, None) => "glass mesh is".to_owned(),
+        (_, _) => format!("{count} glass meshes are"),
     };
     let list = if count == 1 { String::new() } else { format!(": {names}") };
     let (message, help) = match flaw {
-        Flaw::Sheet { one, help, .. } if count == 1 => (format!("{one} of glass has no inside"), help),
-        Flaw::Sheet { several, help, .. } => {
-            (format!("{count} {several} of glass have no inside{list}"), help)
+        GlassFlaw::Sheet { one, help, .. } if count == 1 => (format!("{one} of glass has no interior"), help),
+        GlassFlaw::Sheet { several, help, .. } => {
+            (format!("{count} {several} of glass have no interior{list}"), help)
         }
-        Flaw::Hole => {
-            let of = if count == 1 { "of its surface" } else { "of a surface" };
+        GlassFlaw::Hole => {
+            let of = if count == 1 { "of its surface" } else { "of one surface" };
             let message = format!(
-                "{mesh} not closed: {edges} without a neighbour of the same glass, {part} {of} missing{list}"
+                "{mesh} not closed: {edges} without a neighbor of the same glass, {part} {of} missing{list}"
             );
-            (message, "close the mesh in the program that made it, or give a pane a thickness")
+            (message, "close the mesh in a modeling program, or give a pane some thickness")
         }
-        Flaw::Fronts => {
-            let message = format!("{mesh} inside out in parts: {edges} between two fronts and backs{list}");
-            (message, "let its normals be recalculated, all outwards, in the program that made it")
+        GlassFlaw::Fronts => {
+            let message = format!("{mesh} inconsistently oriented: {edges} between opposite faces{list}");
+            (message, "recalculate its normals to point outwards in a modeling program")
         }
     };
     let mut diagnostic =
@@ -127,14 +127,14 @@ fn warning(loaded: &Loaded, flaw: Flaw, members: &[&OpenGlass]) -> Diagnostic {
     diagnostic
 }
 
-/// Names of the first few objects, or else their lines in the file: `"pane", line 12 and 3 more`.
+/// Returns the names of the first objects, or their lines for unnamed ones: `"pane", line 12 and 3 more`.
 fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
         let line = || format!("line {}", loaded.line(&object.span));
         object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
     };
-    // One more takes no more room than the words about it.
+    // "1 more" would not be shorter than the last name.
     let most = if members.len() == MOST_NAMES + 1 { MOST_NAMES + 1 } else { MOST_NAMES };
     let mut shown: Vec<String> = members.iter().take(most).map(name).collect();
     let last = match members.len() - shown.len() {
@@ -144,15 +144,16 @@ fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
     if shown.is_empty() { last } else { format!("{} and {last}", shown.join(", ")) }
 }
 
-/// The warning about a closed body that encloses nothing.
+/// Returns the warning about a closed mesh without a volume.
 fn warning_of_flat(loaded: &Loaded, object: u32) -> Diagnostic {
     let object = &loaded.scene.objects[object as usize];
     let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
-    let message = format!("glass{name} encloses nothing: its faces are there twice, facing both ways");
+    let message =
+        format!("glass{name} encloses no volume: every face is duplicated with the opposite orientation");
     let help = "export each face once, facing outwards (not double-sided)".to_owned();
     let mut diagnostic = loaded.diagnostic_at(object.span.clone(), Severity::Warning, message, Some(help));
     if let Some(place) = &mut diagnostic.place {
-        place.label = "rays that come in stay inside: all behind it is tinted".to_owned();
+        place.label = "rays that enter it never leave: everything behind it is tinted".to_owned();
     }
     diagnostic
 }
@@ -170,9 +171,9 @@ mod tests {
     use super::*;
     use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
-    use crate::stages::meshes::KeptMesh;
+    use crate::stages::meshes::CachedMesh;
 
-    /// The warnings of a scene whose mesh files are this one.
+    /// Returns the warnings of a scene that uses `mesh` as all of its mesh files.
     fn warnings(text: &str, material: &str, mesh: Option<LoadedMesh>) -> Vec<Diagnostic> {
         let text = format!(
             "[materials.a]\ntype = '{material}'\n{text}\n[render]\nambient = [1, 1, 1]\n[camera]\nposition = [0, 1, 4]\n\
@@ -188,7 +189,7 @@ mod tests {
             .into_iter()
             .map(|mesh| {
                 let key = Fingerprint::new("test").finish();
-                Arc::new(KeptMesh::new(Arc::new(mesh), key, Vec::new()))
+                Arc::new(CachedMesh::new(Arc::new(mesh), key, Vec::new()))
             })
             .collect();
         let token = CancelToken::new();
@@ -207,16 +208,16 @@ mod tests {
     }
 
     #[test]
-    fn shapes_without_an_inside_are_warned_about() {
+    fn shapes_without_interior_cause_warnings() {
         for (shape, expected) in [
-            ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a quad of glass has no inside"),
+            ("[[quad]]\ncorner = [0, 0, 0]\nu = [1, 0, 0]\nv = [0, 1, 0]", "a quad of glass has no interior"),
             (
                 "[[triangle]]\na = [0, 0, 0]\nb = [1, 0, 0]\nc = [0, 1, 0]",
-                "a triangle of glass has no inside",
+                "a triangle of glass has no interior",
             ),
-            ("[[disk]]", "a disk of glass has no inside"),
-            ("[[cylinder]]\ncaps = false", "an open cylinder of glass has no inside"),
-            ("[[cone]]\ncap = false", "an open cone of glass has no inside"),
+            ("[[disk]]", "a disk of glass has no interior"),
+            ("[[cylinder]]\ncaps = false", "an open cylinder of glass has no interior"),
+            ("[[cone]]\ncap = false", "an open cone of glass has no interior"),
         ] {
             let shape = format!("{shape}\nmaterial = 'a'");
             assert_eq!(messages(&shape, "glass", None), [expected]);
@@ -236,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_with_a_hole_is_named_and_said_how_large_the_hole_is() {
+    fn hole_warning_names_the_mesh_and_the_size() {
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
         let all = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
         let of = |triangles: &[[u32; 3]]| {
@@ -247,25 +248,23 @@ mod tests {
         };
         let text = "[[mesh]]\nname = 'drop'\nfile = 'a.ply'\nmaterial = 'a'";
         assert_eq!(messages(text, "glass", of(&all)), [""; 0]);
-        // Half an area of 1 of half an area of 3 + √3.
-        let open = "mesh \"drop\" of glass is not closed: 3 edges without a neighbour of the same glass, 27 % of its surface missing";
+        // The missing face has half an area of 1, the whole mesh half an area of 3 + √3.
+        let open = "glass mesh \"drop\" is not closed: 3 edges without a neighbor of the same glass, 27 % of its surface missing";
         assert_eq!(messages(text, "glass", of(&all[1..])), [open]);
         assert_eq!(messages(text, "phong", of(&all[1..])), [""; 0]);
-        // One of them looks inwards.
+        // One face points inwards.
         let odd = [[0, 1, 2], all[1], all[2], all[3]];
         let odd = &messages(text, "glass", of(&odd))[..];
-        assert_eq!(
-            odd,
-            ["mesh \"drop\" of glass is inside out in parts: 6 edges between two fronts and backs"]
-        );
-        // Each face twice, facing both ways.
+        assert_eq!(odd, ["glass mesh \"drop\" is inconsistently oriented: 6 edges between opposite faces"]);
+        // Every face is duplicated with the opposite orientation.
         let both: Vec<_> = all.iter().flat_map(|&[a, b, c]| [[a, b, c], [a, c, b]]).collect();
-        let twice = "glass \"drop\" encloses nothing: its faces are there twice, facing both ways";
+        let twice =
+            "glass \"drop\" encloses no volume: every face is duplicated with the opposite orientation";
         assert_eq!(messages(text, "glass", of(&both)), [twice]);
     }
 
     #[test]
-    fn open_parts_of_one_kind_share_a_warning_that_names_a_few() {
+    fn similar_open_parts_share_one_warning() {
         let pane = |i: usize| {
             let name = if i == 1 { String::new() } else { format!("name = 'pane {i}'\n") };
             format!("[[quad]]\n{name}corner = [0, {i}, 0]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = 'a'\n")
@@ -273,17 +272,17 @@ mod tests {
         let panes = |count: usize| (0..count).map(pane).collect::<String>();
         let of = |count: usize| messages(&panes(count), "glass", None);
         let five = "\"pane 0\", line 9, \"pane 2\", \"pane 3\"";
-        assert_eq!(of(2), ["2 quads of glass have no inside: \"pane 0\" and line 9"]);
-        assert_eq!(of(5), [format!("5 quads of glass have no inside: {five} and \"pane 4\"")]);
-        assert_eq!(of(6), [format!("6 quads of glass have no inside: {five}, \"pane 4\" and \"pane 5\"")]);
-        assert_eq!(of(30), [format!("30 quads of glass have no inside: {five}, \"pane 4\" and 25 more")]);
-        // Other kinds have warnings of their own.
+        assert_eq!(of(2), ["2 quads of glass have no interior: \"pane 0\" and line 9"]);
+        assert_eq!(of(5), [format!("5 quads of glass have no interior: {five} and \"pane 4\"")]);
+        assert_eq!(of(6), [format!("6 quads of glass have no interior: {five}, \"pane 4\" and \"pane 5\"")]);
+        assert_eq!(of(30), [format!("30 quads of glass have no interior: {five}, \"pane 4\" and 25 more")]);
+        // Another kind of flaw gets its own warning.
         let mixed = format!("[[disk]]\nmaterial = 'a'\n{}", panes(2));
         assert_eq!(messages(&mixed, "glass", None).len(), 2);
     }
 
     #[test]
-    fn parts_of_different_glass_do_not_close_each_other() {
+    fn different_glass_does_not_close_a_solid() {
         let side = |corner: &str, u: &str, v: &str, material: &str| {
             format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
         };
@@ -304,9 +303,8 @@ mod tests {
         assert_eq!(messages(&other("ior = 1.5\ntint = [1, 1, 1]"), "glass", None), [""; 0], "the same glass");
         for glass in ["ior = 1.33", "tint = [0.5, 1, 1]"] {
             let found = messages(&other(glass), "glass", None);
-            // The lid and its four neighbours.
-            let expected = "5 quads of glass have no inside: ";
-            assert!(found.len() == 1 && found[0].starts_with(expected), "{glass}: {found:?}");
+            // The warning covers the lid and its four neighbors.
+            assert!(found.len() == 1 && found[0].starts_with("5 "), "{glass}: {found:?}");
         }
     }
 }

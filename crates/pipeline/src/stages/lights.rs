@@ -1,9 +1,10 @@
-//! The lights of a scene, gathered anew when one of them changed.
+//! The lights stage: collects the scene's lights when one of them changes.
 
 use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::keys;
+use super::super::protocol::reasons;
 use super::Staged;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
@@ -13,10 +14,10 @@ use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
 
-/// The distribution over the map of an environment, which stays while the file does, however it is turned.
+/// Importance distribution of the environment map. It is independent of the map's rotation.
 pub(crate) type SkyMemo = Memo<Option<Arc<EnvironmentMap>>>;
 
-/// Gather them.
+/// Collects the lights, or reuses them if none has changed.
 pub(crate) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
@@ -30,18 +31,18 @@ pub(crate) fn lights(
     let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
     let key = keys::lights(scene, of, (geometry.origin(), geometry.lifts()), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
-        return Ok(Staged::reused(lights.clone(), "no light changed"));
+        return Ok(Staged::reused(lights.clone(), reasons::UNCHANGED));
     }
     let lights = world::lights(scene, geometry, &textures.images, sky(textures, skies), token)?;
     memo.set(key, lights.clone());
     Ok(match lights.len() {
-        0 => Staged::skipped(lights, "the scene has no light"),
+        0 => Staged::skipped(lights, reasons::NO_LIGHTS),
         1 => Staged::done(lights, "1 light"),
         count => {
             let are_picked = |receivers| lights.sampler(receivers).is_some();
             let picked = match (are_picked(SamplingMode::Eye), are_picked(SamplingMode::Paths)) {
-                (true, _) => picked("some are picked", &lights),
-                (false, true) => picked("paths pick some", &lights),
+                (true, _) => picked("a subset is sampled", &lights),
+                (false, true) => picked("a subset is sampled after bounces", &lights),
                 (false, false) => String::new(),
             };
             Staged::done(lights, format!("{count} lights{picked}"))
@@ -49,12 +50,12 @@ pub(crate) fn lights(
     })
 }
 
-/// Words for lights that are too many to sample all of them.
-fn picked(by_whom: &str, lights: &Lights) -> String {
-    format!(", of which {by_whom} at a time; their tree has {} kB", lights.memory_bytes().div_ceil(1000))
+/// Describes a light tree, for scenes with too many lights to sample them all.
+fn picked(which: &str, lights: &Lights) -> String {
+    format!(", {which}; light tree {} kB", lights.memory_bytes().div_ceil(1000))
 }
 
-/// The images that lamps by materials of the scene file have on them.
+/// Returns the textures of emissive materials in the scene file.
 fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     shining.flat_map(move |material| {

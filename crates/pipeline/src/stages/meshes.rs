@@ -1,4 +1,4 @@
-//! Mesh files, several at once, each read only when its content changed.
+//! The meshes stage: loads mesh files in parallel, and only those whose content has changed.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -7,27 +7,29 @@ use std::sync::{Arc, OnceLock};
 use rayon::prelude::*;
 
 use super::super::cache::Pool;
+use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::canonical;
-use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
+use super::{Counts, Findings, LoadedAsset, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
+use crate::messages::{NO_EFFECT, NO_TEXTURE_COORDINATES};
 use crate::scene::description::{MeshFile, Scene, UvSet};
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, MeshBounds};
 
-/// A mesh file with the files that it names.
+/// A mesh file and the other files it references.
 #[derive(Debug)]
-pub(crate) struct KeptMesh {
+pub(crate) struct CachedMesh {
     pub(crate) mesh: Arc<LoadedMesh>,
-    /// All contents that the mesh was made of.
+    /// Key of all file contents that the mesh depends on.
     pub(crate) key: Key,
     companions: Vec<FileRead>,
-    /// Bounds of the mesh, once they have been computed.
+    /// Bounds of the mesh, computed on demand.
     bounds: OnceLock<MeshBounds>,
 }
 
-impl KeptMesh {
+impl CachedMesh {
     pub(super) fn new(mesh: Arc<LoadedMesh>, key: Key, companions: Vec<FileRead>) -> Self {
         Self { mesh, key, companions, bounds: OnceLock::new() }
     }
@@ -37,36 +39,36 @@ impl KeptMesh {
     }
 }
 
-/// One for each of the scene's mesh files; those that failed are empty.
-pub(crate) type Meshes = Vec<Arc<KeptMesh>>;
+/// One mesh per mesh file of the scene. Meshes that failed to load are empty.
+pub(crate) type Meshes = Vec<Arc<CachedMesh>>;
 
-/// Load what the scene names. All files are tried; errors go to the findings.
+/// Loads the scene's meshes. Tries all files and adds errors to the findings.
 ///
 /// # Errors
-/// Cancelled.
+/// [`Stop::Cancelled`] and out of memory.
 pub(crate) fn meshes(
     loaded: &Loaded,
-    cache: &mut Pool<MeshName, KeptMesh>,
+    cache: &mut Pool<MeshName, CachedMesh>,
     findings: &mut Findings,
     reading: &Reading<'_>,
 ) -> Result<Staged<Meshes>, Stop> {
     let files = &loaded.scene.mesh_files;
     if files.is_empty() {
-        return Ok(Staged::skipped(Vec::new(), "the scene has no mesh"));
+        return Ok(Staged::skipped(Vec::new(), reasons::NO_MESHES));
     }
-    let before: Vec<(Content, Option<Arc<KeptMesh>>)> = files
+    let before: Vec<(Content, Option<Arc<CachedMesh>>)> = files
         .iter()
         .map(|file| {
             let name = name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
-                // What it named last time it most likely names again: hashed before it is read.
+                // Hash the files that the mesh referenced before they are read, because it most likely references them again.
                 companions(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
         })
         .collect::<Result<_, Cancelled>>()?;
-    let assets: Vec<Asset<KeptMesh>> = reading.pool.install(|| {
+    let assets: Vec<LoadedAsset<CachedMesh>> = reading.pool.install(|| {
         files
             .par_iter()
             .zip(before)
@@ -80,9 +82,9 @@ pub(crate) fn meshes(
     })?;
     let mut meshes = Vec::new();
     let mut counts = Counts::default();
-    let mut warnings = Warnings::default();
-    let own_materials = with_own_materials(&loaded.scene);
-    for ((file, asset), uses_own) in files.iter().zip(assets).zip(own_materials) {
+    let mut warnings = MeshWarnings::default();
+    let file_materials = uses_file_materials(&loaded.scene);
+    for ((file, asset), uses_own) in files.iter().zip(assets).zip(file_materials) {
         let content = asset.files[0].content;
         asset.files.into_iter().for_each(|file| findings.read(file));
         let mesh = match asset.result {
@@ -100,12 +102,12 @@ pub(crate) fn meshes(
                 counts.failed += 1;
                 findings.asset_error(loaded, file.span.clone(), &error);
                 let key = file_key(file, content);
-                Arc::new(KeptMesh::new(Arc::default(), key, Vec::new()))
+                Arc::new(CachedMesh::new(Arc::default(), key, Vec::new()))
             }
         };
         meshes.push(mesh);
     }
-    warn(loaded, warnings.describe_error(), findings);
+    warn(loaded, warnings.messages(), findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
         if let Some(mesh) = object.shape.mesh()
             && meshes[mesh.file].mesh.lacks_materials()
@@ -124,11 +126,11 @@ pub(crate) fn meshes(
     Ok(loaded_and_kept(meshes, counts))
 }
 
-/// Warns about objects whose keys and materials ask for parts that their mesh files lack. Files that were not read lack nothing.
+/// Warns about objects that need data their mesh files lack. Files that could not be read are skipped.
 fn warn_about_missing_parts(
     loaded: &Loaded,
     files: &[MeshFile],
-    meshes: &[Arc<KeptMesh>],
+    meshes: &[Arc<CachedMesh>],
     findings: &mut Findings,
 ) {
     for object in &loaded.scene.objects {
@@ -140,10 +142,10 @@ fn warn_about_missing_parts(
         let material = object.material.map(|material| &loaded.scene.materials[material]);
         let mut warn = |message| findings.warn(loaded, object.span.clone(), message);
         if mesh.vertex_colors && read.colors.is_empty() {
-            warn(format!("`vertex_colors` changes nothing: the vertices of {file} have no colours"));
+            warn(format!("`vertex_colors` {NO_EFFECT}: the vertices of {file} have no colors"));
         } else if let Some(material) = material.filter(|own| mesh.vertex_colors && !own.kind.has_color()) {
             let name = &material.name;
-            warn(format!("`vertex_colors` changes nothing: \"{name}\" has no colour that they multiply"));
+            warn(format!("`vertex_colors` {NO_EFFECT}: material \"{name}\" has no color to multiply"));
         }
         let Some(material) = material else { continue };
         let name = &material.name;
@@ -154,7 +156,7 @@ fn warn_about_missing_parts(
         {
             let texture = &textures[texture].name;
             warn(format!(
-                "{file} has no second set of texture coordinates: \"{texture}\" of \"{name}\" takes the first"
+                "{file} has no second set of texture coordinates: texture \"{texture}\" of \"{name}\" uses the first"
             ));
         }
         if !read.uvs.is_empty() {
@@ -162,39 +164,39 @@ fn warn_about_missing_parts(
         }
         if material.kind.has_direction() {
             warn(format!(
-                "{file} has no texture coordinates: the `anisotropy` of \"{name}\" has no direction there"
+                "{file} {NO_TEXTURE_COORDINATES}, which the `anisotropy` of \"{name}\" needs for its direction"
             ));
         }
         if !material.textures().is_empty() {
             warn(format!(
-                "{file} has no texture coordinates: each triangle shows half of the textures of \"{name}\""
+                "{file} {NO_TEXTURE_COORDINATES}: each triangle shows half of every texture of \"{name}\""
             ));
         }
     }
 }
 
-/// A mesh file and the number of its part, however the scene spells it.
+/// Canonical path of a mesh file, and a part of it.
 pub(crate) type MeshName = (PathBuf, Option<u32>);
 
 fn name(file: &MeshFile) -> MeshName {
     (canonical(&file.value), file.part)
 }
 
-/// One file of this content: from before if it and all that it names are as they were.
+/// Loads one file, or returns the cached mesh if the file and all files it references are unchanged.
 fn one(
     file: &MeshFile,
     content: Content,
-    kept: Option<Arc<KeptMesh>>,
+    kept: Option<Arc<CachedMesh>>,
     reading: &Reading<'_>,
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
-) -> Result<Asset<KeptMesh>, Cancelled> {
+) -> Result<LoadedAsset<CachedMesh>, Cancelled> {
     let path = &file.value;
     let mut files = vec![FileRead { path: path.to_owned(), content }];
     if let Some(mesh) = kept
         && mesh.companions == companions(&mesh.companions, reading)?
     {
         files.extend(mesh.companions.iter().cloned());
-        return Ok(Asset { files, result: Ok((mesh, true)) });
+        return Ok(LoadedAsset { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let read = || reading.sink.asset(&name, |progress| load(path, progress, reading.token));
@@ -216,14 +218,14 @@ fn one(
             for file in &companions {
                 file.content.add_to(key.path(&file.path));
             }
-            Ok((Arc::new(KeptMesh::new(Arc::new(mesh), key.finish(), companions)), false))
+            Ok((Arc::new(CachedMesh::new(Arc::new(mesh), key.finish(), companions)), false))
         }
         Err(error) => Err(error),
     };
-    Ok(Asset { files, result })
+    Ok(LoadedAsset { files, result })
 }
 
-/// Whether a file that could not be read can be read now, and this request did not know of it before.
+/// Whether a file that was missing when the mesh was loaded exists now, although this request had not looked at it.
 fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
@@ -235,7 +237,7 @@ fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool,
     Ok(false)
 }
 
-/// These files as they are now.
+/// Returns the current contents of these files.
 fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>, Cancelled> {
     let now = |file: &FileRead| {
         let content = reading.contents.read(&file.path, reading.token)?;
@@ -250,42 +252,42 @@ fn file_key(file: &MeshFile, content: Content) -> Key {
     key.finish()
 }
 
-/// Whether an object shows the file's own materials, for each mesh file.
-fn with_own_materials(scene: &Scene) -> Vec<bool> {
+/// Returns for each mesh file whether an object uses the file's own materials.
+fn uses_file_materials(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
     let plain = scene.objects.iter().filter(|object| object.material.is_none());
     plain.filter_map(|object| object.shape.mesh()).for_each(|mesh| shown[mesh.file] = true);
     shown
 }
 
-/// Warnings about mesh files, each said once. The faces that parts of a file leave out are counted together.
+/// MeshWarnings about mesh files without duplicates. Dropped faces are summed over the parts of a file.
 #[derive(Default)]
-struct Warnings<'a> {
-    all: Vec<(&'a MeshFile, Warning)>,
-    /// Place in the list of the faces that a file leaves out.
+struct MeshWarnings<'a> {
+    all: Vec<(&'a MeshFile, MeshWarning)>,
+    /// Index of a file's warning about dropped faces.
     dropped: HashMap<&'a Path, usize>,
     known: HashSet<String>,
 }
 
-enum Warning {
-    /// Faces left out by so many parts.
+enum MeshWarning {
+    /// Dropped faces, and the number of parts they are from.
     Dropped(Dropped, usize),
-    Words(String),
+    Message(String),
 }
 
-impl<'a> Warnings<'a> {
-    /// Adds those of a file. Those about its own materials count only if an object shows these.
+impl<'a> MeshWarnings<'a> {
+    /// Adds the warnings of a file. MeshWarnings about its materials are added only if an object uses them.
     fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
         if mesh.dropped != Dropped::default() {
             let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
             match self.all.get_mut(place) {
-                Some((_, Warning::Dropped(all, parts))) => {
+                Some((_, MeshWarning::Dropped(all, parts))) => {
                     all.non_finite += mesh.dropped.non_finite;
                     all.degenerate += mesh.dropped.degenerate;
                     *parts += 1;
                 }
-                Some((_, Warning::Words(_))) | None => {
-                    self.all.push((file, Warning::Dropped(mesh.dropped, 1)));
+                Some((_, MeshWarning::Message(_))) | None => {
+                    self.all.push((file, MeshWarning::Dropped(mesh.dropped, 1)));
                 }
             }
         }
@@ -293,16 +295,16 @@ impl<'a> Warnings<'a> {
         for said in mesh.warnings.iter().chain(of_materials) {
             let words = format!("{}: {said}", file.value.display());
             if self.known.insert(words.clone()) {
-                self.all.push((file, Warning::Words(words)));
+                self.all.push((file, MeshWarning::Message(words)));
             }
         }
     }
 
-    fn describe_error(self) -> Vec<(&'a MeshFile, String)> {
-        let words = |(file, warning): (&'a MeshFile, Warning)| {
+    fn messages(self) -> Vec<(&'a MeshFile, String)> {
+        let words = |(file, warning): (&'a MeshFile, MeshWarning)| {
             let words = match warning {
-                Warning::Words(words) => words,
-                Warning::Dropped(faces, parts) => {
+                MeshWarning::Message(words) => words,
+                MeshWarning::Dropped(faces, parts) => {
                     let of_parts = if parts > 1 { format!(" in {parts} parts") } else { String::new() };
                     format!("{}: {}{of_parts}", file.value.display(), dropped(&faces)?)
                 }
@@ -313,7 +315,7 @@ impl<'a> Warnings<'a> {
     }
 }
 
-/// Most warnings of all mesh files.
+/// Maximum number of warnings about all mesh files.
 const MOST_WARNINGS: usize = 100;
 
 fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
@@ -324,11 +326,11 @@ fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Find
     }
     if let Some(span) = last.filter(|_| unsaid > 0) {
         let s = if unsaid == 1 { "" } else { "s" };
-        findings.warn(loaded, span, format!("{unsaid} more warning{s} of mesh files"));
+        findings.warn(loaded, span, format!("{unsaid} more warning{s} about mesh files"));
     }
 }
 
-/// The faces that were left out, in words.
+/// Describes the dropped faces. Returns `None` if there are none.
 fn dropped(faces: &Dropped) -> Option<String> {
     let count = |number: u64, what: &str| {
         (number > 0).then(|| format!("{number} face{} {what}", if number == 1 { "" } else { "s" }))
@@ -338,7 +340,7 @@ fn dropped(faces: &Dropped) -> Option<String> {
             .into_iter()
             .flatten()
             .collect();
-    (!parts.is_empty()).then(|| format!("left out {}", parts.join(" and ")))
+    (!parts.is_empty()).then(|| format!("skipped {}", parts.join(" and ")))
 }
 
 #[cfg(test)]
@@ -350,25 +352,25 @@ mod tests {
 
     const OBJ: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
-    /// A folder with a mesh and its material, and what reads them.
-    struct Desk {
+    /// A folder with a mesh and its material, and the state needed to load them.
+    struct MeshFixture {
         folder: tempfile::TempDir,
         sink: Sink,
         pool: rayon::ThreadPool,
-        cache: Pool<MeshName, KeptMesh>,
+        cache: Pool<MeshName, CachedMesh>,
         contents: Arc<Contents>,
     }
 
-    impl Desk {
+    impl MeshFixture {
         fn new() -> Self {
             let folder = tempfile::tempdir().expect("a scratch folder");
             let events = std::sync::mpsc::channel().0;
             let sink = Sink { generation: 0, events, previews: Default::default(), within: None };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
-            let desk = Self { folder, sink, pool, cache: Pool::default(), contents: Arc::default() };
-            desk.write("a.obj", OBJ);
-            desk.write("a.mtl", "newmtl m\nKd 1 0 0\n");
-            desk
+            let fixture = Self { folder, sink, pool, cache: Pool::default(), contents: Arc::default() };
+            fixture.write("a.obj", OBJ);
+            fixture.write("a.mtl", "newmtl m\nKd 1 0 0\n");
+            fixture
         }
 
         fn write(&self, name: &str, text: &str) {
@@ -384,14 +386,14 @@ mod tests {
             Contents::default().read(&path, &CancelToken::new()).expect("not cancelled")
         }
 
-        /// Requests `a.obj` with the files of this snapshot: returns the mesh and the files with their contents.
-        fn read(&mut self, contents: &Snapshot) -> (Arc<KeptMesh>, Vec<FileRead>) {
+        /// Loads `a.obj` from a snapshot. Returns the mesh and the contents of its files.
+        fn read(&mut self, contents: &Snapshot) -> (Arc<CachedMesh>, Vec<FileRead>) {
             let (meshes, findings) = self.find("[[mesh]]\nfile = \"a.obj\"\n", contents);
             assert!(findings.errors.is_empty(), "{:?}", findings.errors);
             (meshes[0].clone(), findings.files)
         }
 
-        /// The meshes of a scene with these tables.
+        /// Loads the meshes of a scene with these tables.
         fn find(&mut self, tables: &str, contents: &Snapshot) -> (Meshes, Findings) {
             let camera = "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n";
             self.write("scene.toml", &format!("{tables}{camera}"));
@@ -411,27 +413,27 @@ mod tests {
     }
 
     #[test]
-    fn what_a_files_own_materials_lack_is_said_where_they_are_shown() {
-        let mut desk = Desk::new();
-        desk.write("a.obj", &OBJ.replace("usemtl m\n", "f 1 3 2\nusemtl none\n"));
-        let mut said = |tables: &str| {
-            let snapshot = desk.snapshot();
-            desk.find(tables, &snapshot).1.warnings.len()
+    fn material_warnings_need_a_user() {
+        let mut fixture = MeshFixture::new();
+        fixture.write("a.obj", &OBJ.replace("usemtl m\n", "f 1 3 2\nusemtl none\n"));
+        let mut count = |tables: &str| {
+            let snapshot = fixture.snapshot();
+            fixture.find(tables, &snapshot).1.warnings.len()
         };
         let own = "[[mesh]]\nfile = \"a.obj\"\n";
         let given = format!("[materials.red]\n{own}material = \"red\"\n");
-        assert_eq!([said(own), said(&given), said(&format!("{given}{own}"))], [1, 0, 1]);
+        assert_eq!([count(own), count(&given), count(&format!("{given}{own}"))], [1, 0, 1]);
     }
 
     #[test]
-    fn a_light_that_shines_away_from_every_mesh_is_said() {
-        let mut desk = Desk::new();
-        let mut said = |lamp: &str, place: &str| {
-            let lamp =
-                format!("[materials.lamp]\nemission = [5, 5, 5]\n[[quad]]\nmaterial = \"lamp\"\n{lamp}");
-            let tables = format!("{lamp}\n[[mesh]]\nfile = \"a.obj\"\n{place}\n");
-            let snapshot = desk.snapshot();
-            let warnings = desk.find(&tables, &snapshot).1.warnings;
+    fn light_facing_away_from_all_meshes_warns() {
+        let mut fixture = MeshFixture::new();
+        let mut count = |light: &str, place: &str| {
+            let light =
+                format!("[materials.light]\nemission = [5, 5, 5]\n[[quad]]\nmaterial = \"light\"\n{light}");
+            let tables = format!("{light}\n[[mesh]]\nfile = \"a.obj\"\n{place}\n");
+            let snapshot = fixture.snapshot();
+            let warnings = fixture.find(&tables, &snapshot).1.warnings;
             for warning in &warnings {
                 let place = warning.place.as_ref().expect("a place");
                 assert!(warning.message.contains("shines away") && place.label == "all shapes are behind it");
@@ -439,112 +441,114 @@ mod tests {
             }
             warnings.len()
         };
-        // The triangle is from y = 0 to y = 1, the camera at y = 0.
+        // The triangle spans y = 0 to y = 1; the camera is at y = 0.
         let above_up = "corner = [-1, 2, -1]\nu = [0, 0, 2]\nv = [2, 0, 0]";
         let above_down = "corner = [-1, 2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
         let below_down = "corner = [-1, -2, -1]\nu = [2, 0, 0]\nv = [0, 0, 2]";
-        for (lamp, place, count) in [
+        for (light, place, expected) in [
             (above_up, "", 1),
             (above_down, "", 0),
             (below_down, "", 1),
             (above_up, "translate = [0, 3, 0]", 0),
             (above_up, "scale = [1, 4, 1]", 0),
-            // Lying on its back, and upside down.
+            // Laid on its back, and turned upside down.
             (above_up, "scale = [1, 4, 1]\nrotate = [90, 0, 0]", 1),
             (below_down, "rotate = [180, 0, 0]", 1),
             (below_down, "rotate = [180, 0, 0]\ntranslate = [0, -1.5, 0]", 0),
-            // What the camera sees is meant.
+            // A surface that the camera sees is intended.
             (above_down, "translate = [0, 3, 0]", 0),
         ] {
-            assert_eq!(said(lamp, place), count, "{lamp}\n{place}");
+            assert_eq!(count(light, place), expected, "{light}\n{place}");
         }
     }
 
     #[test]
-    fn warnings_are_a_hundred_at_most() {
-        let mut desk = Desk::new();
+    fn warnings_are_limited_to_a_hundred() {
+        let mut fixture = MeshFixture::new();
         let names: String = (0..102).map(|name| format!("usemtl x{name}\nf 1 2 3\n")).collect();
-        desk.write("a.obj", &OBJ.replace("usemtl m\n", &names));
-        let snapshot = desk.snapshot();
-        let warnings = desk.find("[[mesh]]\nfile = \"a.obj\"\n", &snapshot).1.warnings;
+        fixture.write("a.obj", &OBJ.replace("usemtl m\n", &names));
+        let snapshot = fixture.snapshot();
+        let warnings = fixture.find("[[mesh]]\nfile = \"a.obj\"\n", &snapshot).1.warnings;
         assert_eq!(warnings.len(), MOST_WARNINGS + 1);
-        assert_eq!(warnings[MOST_WARNINGS].message, "2 more warnings of mesh files");
+        assert_eq!(warnings[MOST_WARNINGS].message, "2 more warnings about mesh files");
     }
 
     #[test]
-    fn a_file_that_changes_while_it_is_looked_at_is_not_taken_for_the_new_one() {
-        let mut desk = Desk::new();
-        let old = desk.hash("a.obj");
-        desk.read(&desk.snapshot());
-        // The request has hashed the file, then it changes, then the request goes on.
-        let snapshot = desk.snapshot();
-        snapshot.read(&desk.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
-        desk.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
-        let (mesh, files) = desk.read(&snapshot);
-        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "kept from before");
+    fn file_changed_during_a_request_is_noticed() {
+        let mut fixture = MeshFixture::new();
+        let old = fixture.hash("a.obj");
+        fixture.read(&fixture.snapshot());
+        // The file changes after the request has hashed it.
+        let snapshot = fixture.snapshot();
+        snapshot.read(&fixture.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
+        fixture.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
+        let (mesh, files) = fixture.read(&snapshot);
+        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "cached");
         assert_eq!(snapshot.changed(), None);
-        desk.cache = Pool::default();
-        let (mesh, files) = desk.read(&snapshot);
-        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, desk.hash("a.obj")), "decoded");
-        assert_eq!(snapshot.changed(), Some(desk.folder.path().join("a.obj")), "the request starts again");
-        let (mesh, files) = desk.read(&desk.snapshot());
+        fixture.cache = Pool::default();
+        let (mesh, files) = fixture.read(&snapshot);
+        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, fixture.hash("a.obj")), "decoded");
+        assert_eq!(snapshot.changed(), Some(fixture.folder.path().join("a.obj")), "the request starts again");
+        let (mesh, files) = fixture.read(&fixture.snapshot());
         assert_eq!(mesh.mesh.mesh.triangles.len(), 2);
-        assert_eq!(files[0].content, desk.hash("a.obj"));
+        assert_eq!(files[0].content, fixture.hash("a.obj"));
     }
 
     #[test]
-    fn a_material_that_changes_after_it_was_read_is_not_taken_for_the_new_one() {
-        let desk = Desk::new();
-        let path = desk.folder.path().join("a.obj");
+    fn material_file_changed_after_reading_is_noticed() {
+        let fixture = MeshFixture::new();
+        let path = fixture.folder.path().join("a.obj");
         let file = MeshFile { value: path, span: 0..0, part: None };
-        let snapshot = desk.snapshot();
+        let snapshot = fixture.snapshot();
         let token = CancelToken::new();
         let reading = Reading {
-            sink: &desk.sink,
+            sink: &fixture.sink,
             token: &token,
             contents: &snapshot,
-            pool: &desk.pool,
+            pool: &fixture.pool,
             containers: &Containers::default(),
         };
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);
-            desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
+            fixture.write("a.mtl", "newmtl m\nKd 0 1 0\n");
             mesh
         };
-        let old = desk.hash("a.mtl");
-        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+        let old = fixture.hash("a.mtl");
+        let asset =
+            one(&file, fixture.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!((asset.files[1].content, mesh.mesh.materials[0].diffuse.x), (old, 1.0));
     }
 
     #[test]
-    fn a_material_file_that_appears_after_it_was_missed_is_read() {
-        let desk = Desk::new();
-        std::fs::remove_file(desk.folder.path().join("a.mtl")).expect("removed");
-        let path = desk.folder.path().join("a.obj");
+    fn material_file_that_appears_is_read() {
+        let fixture = MeshFixture::new();
+        std::fs::remove_file(fixture.folder.path().join("a.mtl")).expect("removed");
+        let path = fixture.folder.path().join("a.obj");
         let file = MeshFile { value: path, span: 0..0, part: None };
-        let snapshot = desk.snapshot();
+        let snapshot = fixture.snapshot();
         let token = CancelToken::new();
         let reading = Reading {
-            sink: &desk.sink,
+            sink: &fixture.sink,
             token: &token,
             contents: &snapshot,
-            pool: &desk.pool,
+            pool: &fixture.pool,
             containers: &Containers::default(),
         };
         let load_and_appear = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);
-            desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
+            fixture.write("a.mtl", "newmtl m\nKd 0 1 0\n");
             mesh
         };
-        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
+        let asset =
+            one(&file, fixture.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
-        assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
+        assert_eq!(asset.files[1].content, fixture.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0);
     }
 
     #[test]
-    fn a_warning_about_many_parts_of_a_file_is_said_once() {
+    fn warning_about_many_parts_is_given_once() {
         let part = |part| MeshFile { value: PathBuf::from("a.glb"), part: Some(part), span: 0..0 };
         let (files, other) =
             ([part(0), part(1), part(2)], MeshFile { value: "b.ply".into(), part: None, span: 0..0 });
@@ -553,26 +557,26 @@ mod tests {
             warnings: vec![warning.to_owned()],
             ..LoadedMesh::default()
         };
-        let mut warnings = Warnings::default();
+        let mut warnings = MeshWarnings::default();
         files.iter().for_each(|file| warnings.add(file, &mesh(149, "odd"), true));
         warnings.add(&other, &mesh(1, "odd"), true);
-        let said: Vec<String> = warnings.describe_error().into_iter().map(|(_, said)| said).collect();
+        let messages: Vec<String> = warnings.messages().into_iter().map(|(_, message)| message).collect();
         let expected = [
-            "a.glb: left out 447 faces without area in 3 parts",
+            "a.glb: skipped 447 faces without area in 3 parts",
             "a.glb: odd",
-            "b.ply: left out 1 face without area",
+            "b.ply: skipped 1 face without area",
             "b.ply: odd",
         ];
-        assert_eq!(said, expected);
+        assert_eq!(messages, expected);
     }
 
     #[test]
-    fn dropped_faces_are_counted_in_words() {
+    fn dropped_faces_are_counted() {
         assert_eq!(dropped(&Dropped::default()), None);
         let some = Dropped { non_finite: 1, degenerate: 12 };
         assert_eq!(
             dropped(&some).as_deref(),
-            Some("left out 1 face with non-finite coordinates and 12 faces without area")
+            Some("skipped 1 face with non-finite coordinates and 12 faces without area")
         );
     }
 }

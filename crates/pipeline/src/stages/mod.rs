@@ -1,4 +1,4 @@
-//! The stages, one file each: a function of its inputs and of what is kept from before.
+//! The stages, one file each. A stage is a function of its inputs and its cache.
 
 pub(super) mod accel;
 pub(super) mod containers;
@@ -21,7 +21,7 @@ use std::time::Instant;
 use rayon::ThreadPool;
 
 use self::containers::Containers;
-use super::protocol::{Failure, Status};
+use super::protocol::{Failure, Status, reasons};
 use super::sink::Sink;
 use super::watch::content::{Contents, FileRead, Snapshot};
 use crate::assets::AssetError;
@@ -29,7 +29,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::scene::Loaded;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
-/// Why a request went no further.
+/// Why a request ended early.
 #[derive(Debug)]
 pub(super) enum Stop {
     Cancelled,
@@ -43,12 +43,12 @@ impl From<Cancelled> for Stop {
 }
 
 impl Stop {
-    #[allow(clippy::needless_pass_by_value, reason = "it is handed to `map_err`")]
+    #[allow(clippy::needless_pass_by_value, reason = "it is passed to `map_err`")]
     pub(super) fn work(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }
 
-    /// Something is wrong with the call, which has no place in the scene.
+    /// An invalid command line, which has no location in the scene.
     pub(super) fn wrong_call(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();
@@ -56,7 +56,7 @@ impl Stop {
     }
 }
 
-/// Result of a stage, and how it came about.
+/// Result of a stage with its status and the reason for it.
 #[derive(Debug)]
 pub(super) struct Staged<T> {
     pub(super) value: T,
@@ -78,7 +78,7 @@ impl<T> Staged<T> {
     }
 }
 
-/// Inputs shared by stages that read files.
+/// Inputs shared by the stages that read files.
 pub(super) struct Reading<'a> {
     pub(super) sink: &'a Sink,
     pub(super) token: &'a CancelToken,
@@ -87,16 +87,16 @@ pub(super) struct Reading<'a> {
     pub(super) containers: &'a Containers,
 }
 
-/// Findings of a request about files, errors and warnings.
+/// Files, errors and warnings found by a request.
 #[derive(Debug)]
 pub(super) struct Findings {
-    /// Before anything was read.
+    /// Time before the first read.
     pub(super) begun: Instant,
-    /// Everything that was read or tried, each once.
+    /// All files that were read or tried, without duplicates.
     pub(super) files: Vec<FileRead>,
     known: HashSet<FileRead>,
     pub(super) errors: Vec<Diagnostic>,
-    /// Why nothing is written, as it was found last.
+    /// Current reasons why no image is written.
     pub(super) conflicts: Vec<Diagnostic>,
     pub(super) warnings: Vec<Diagnostic>,
 }
@@ -115,7 +115,7 @@ impl Default for Findings {
 }
 
 impl Findings {
-    /// Forgets everything but when the request began.
+    /// Resets everything except the start time of the request.
     pub(super) fn start_again(&mut self) {
         *self = Self { begun: self.begun, ..Self::default() };
     }
@@ -126,15 +126,15 @@ impl Findings {
         }
     }
 
-    /// Puts the content that was decoded in place of one that was seen before.
+    /// Replaces the earlier content of a file by the decoded one.
     pub(super) fn read_instead(&mut self, file: FileRead) {
         self.known.retain(|known| known.path != file.path);
         self.files.retain(|known| known.path != file.path);
         self.read(file);
     }
 
-    /// A scene may be broken because it names a file that is not there: what the errors underline is watched as
-    /// if it were a file's name, so that its coming is noticed.
+    /// Adds files that may be missing. A scene may be broken because a file does not exist, so the text underlined by
+    /// each error is watched as a file name.
     pub(super) fn read_named(
         &mut self,
         diagnostics: &[Diagnostic],
@@ -155,12 +155,12 @@ impl Findings {
         }
     }
 
-    /// An asset could not be used; the error stands where the scene names it.
+    /// Adds an error about an asset, at the place that references it.
     pub(super) fn asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
         self.errors.push(at(loaded, span, Severity::Error, error.to_string()));
     }
 
-    /// Something in the scene does not go with the assets.
+    /// Adds an error about a mismatch between the scene and its assets.
     pub(super) fn error(&mut self, loaded: &Loaded, span: Range<usize>, message: String, help: &str) {
         self.errors.push(loaded.diagnostic_at(span, Severity::Error, message, Some(help.to_owned())));
     }
@@ -169,7 +169,7 @@ impl Findings {
         self.warnings.push(at(loaded, span, Severity::Warning, message));
     }
 
-    /// All errors and warnings, errors first.
+    /// Takes all errors and warnings, errors first.
     pub(super) fn take_failure(&mut self) -> Failure {
         let mut all = std::mem::take(&mut self.errors);
         all.append(&mut self.warnings);
@@ -177,37 +177,38 @@ impl Findings {
     }
 }
 
-/// A diagnostic at a place of the scene file.
+/// Creates a diagnostic without help at a span of the scene file.
 fn at(loaded: &Loaded, span: Range<usize>, severity: Severity, message: String) -> Diagnostic {
     loaded.diagnostic_at(span, severity, message, None)
 }
 
-/// One asset, as a parallel load gives it back.
-pub(super) struct Asset<T> {
-    /// The file first, then those that it names.
+/// Result of loading one asset.
+pub(super) struct LoadedAsset<T> {
+    /// The file, followed by the files it references.
     pub(super) files: Vec<FileRead>,
-    /// The value and whether it was kept from before.
+    /// The value, and whether it was cached.
     pub(super) result: Result<(Arc<T>, bool), AssetError>,
 }
 
-/// The words for how many of some assets were loaded and how many kept.
+/// Reports a stage that loads files, with the numbers of loaded and cached ones.
 pub(super) fn loaded_and_kept<T>(value: T, counts: Counts) -> Staged<T> {
     let Counts { loaded, kept, failed, left_out } = counts;
     if loaded + failed == 0 {
-        return Staged::reused(value, "the files did not change");
+        return Staged::reused(value, reasons::UNCHANGED);
     }
-    let parts = [(loaded, "loaded"), (kept, "kept"), (failed, "failed"), (left_out, "not shown")].into_iter();
+    let parts =
+        [(loaded, "loaded"), (kept, "cached"), (failed, "failed"), (left_out, "not needed")].into_iter();
     let parts: Vec<String> =
         parts.filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")).collect();
     Staged::done(value, parts.join(", "))
 }
 
-/// Counts of a stage's files.
+/// File counts of a stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     pub(super) loaded: usize,
     pub(super) kept: usize,
     pub(super) failed: usize,
-    /// Not asked for, as the view does not show them.
+    /// Not loaded because the view does not need them.
     pub(super) left_out: usize,
 }

@@ -1,4 +1,4 @@
-//! The scene file, and the orbiter file that holds its camera.
+//! The parse stage: reads the scene file, and the orbiter file if it contains the camera.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::super::cache::Memo;
 use super::super::model::{self, ModelText, Show};
-use super::super::protocol::Failure;
+use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
 use super::{Findings, Staged, Stop};
@@ -23,34 +23,34 @@ use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::is_model;
 use crate::scene::sanitize::visible;
 
-/// A scene that was understood.
+/// A valid scene.
 #[derive(Debug)]
 pub(crate) struct Parsed {
     pub(crate) loaded: Arc<scene::Loaded>,
     pub(crate) orbiter: Option<OrbiterCamera>,
-    /// Files that the scene file names, and those that these name, where the call sets anything.
+    /// Files that the scene references without the overrides, and files referenced by those.
     pub(crate) named: Vec<PathBuf>,
-    /// Files that a model's scene was made of, beside the model.
+    /// Files that a model's scene depends on, apart from the model.
     companions: Vec<FileRead>,
-    /// Approximations of a model's scene.
+    /// Approximations made for a model's scene.
     notes: Vec<Diagnostic>,
     orbiter_content: Option<Content>,
 }
 
-/// What the call asks for.
+/// The scene to parse, and how.
 #[derive(Clone, Copy)]
-pub(crate) struct Origin<'a> {
-    /// The scene file, or a model.
+pub(crate) struct SceneSource<'a> {
+    /// Path of a scene file or a model.
     pub(crate) path: &'a Path,
-    /// Values in place of the scene's.
+    /// Overrides of scene keys.
     pub(crate) sets: &'a [String],
-    /// How a model is shown.
+    /// How to show a model.
     pub(crate) show: Show,
 }
 
-/// The scene of a model, and the other files that it is made of.
+/// Generates the scene of a model. Returns it with the other files it depends on.
 fn model_scene(
-    Origin { path, sets, show }: Origin<'_>,
+    SceneSource { path, sets, show }: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
     findings: &mut Findings,
     token: &CancelToken,
@@ -59,7 +59,7 @@ fn model_scene(
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
         AssetError::Unreadable { path, reason } => {
-            // A file that is missing is watched, so that its coming is noticed.
+            // Watch a missing file, so that its creation is noticed.
             if let Ok(content) = contents.read(&path, token) {
                 findings.read(FileRead { path: path.clone(), content });
             }
@@ -82,26 +82,26 @@ fn broken(path: &Path, message: String) -> Stop {
     Stop::Failed(Failure::Scene(vec![of_file(path, Severity::Error, message)]))
 }
 
-/// A diagnostic about a whole file.
+/// Creates a diagnostic about a whole file.
 fn of_file(path: &Path, severity: Severity, message: String) -> Diagnostic {
     Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
 }
 
-/// Read and validate the scene, with what the call sets in it.
+/// Reads and validates the scene, with the overrides of the command line.
 ///
 /// # Errors
 /// All errors of the scene file.
 pub(crate) fn parse(
-    origin: Origin<'_>,
+    origin: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
     memo: &mut Memo<Arc<Parsed>>,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<Staged<Arc<Parsed>>, Stop> {
-    let Origin { path, show, .. } = origin;
+    let SceneSource { path, show, .. } = origin;
     if let Held::Differs(held) = held::recover(path) {
         let help =
-            Some("compare both, save what you need as the scene, and remove the other file".to_owned());
+            Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
         findings.warnings.push(Diagnostic { help, ..of_file(path, Severity::Warning, held::words(&held)) });
     }
     let content = contents.read(path, token)?;
@@ -109,8 +109,8 @@ pub(crate) fn parse(
     if !is_model && (show.from.is_some() || show.up.is_some()) {
         findings.read(FileRead { path: path.to_owned(), content });
         let message = match show.from {
-            Some(_) => "--from is for models: a scene has its own camera",
-            None => "--up is for models: in a scene y is up",
+            Some(_) => "`--from` applies to models; a scene has its own camera",
+            None => "`--up` applies to models; scenes are always y-up",
         };
         return Err(Stop::Failed(Failure::Scene(vec![of_file(
             Path::new(""),
@@ -119,7 +119,7 @@ pub(crate) fn parse(
         )])));
     }
     let key = |content| key(origin, content, is_model);
-    // A model is made of more than one file: each of them must be as it was.
+    // A model's scene depends on several files, all of which must be unchanged.
     let is_same = |parsed: &&Arc<Parsed>| {
         let now =
             |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
@@ -129,7 +129,8 @@ pub(crate) fn parse(
     let (loaded, content, companions, notes) = match &known {
         Some(parsed) => (parsed.loaded.clone(), content, parsed.companions.clone(), parsed.notes.clone()),
         None => {
-            // Until it was understood; then its content is that of the bytes that were.
+            // Record the current content, because parsing may fail. After a success, it is replaced by the parsed
+            // bytes' content.
             findings.read(FileRead { path: path.to_owned(), content });
             read(origin, (contents, containers), memo.latest(), findings, token)?
         }
@@ -139,28 +140,28 @@ pub(crate) fn parse(
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
-        return Ok(Staged::reused(parsed, "the scene is as it was"));
+        return Ok(Staged::reused(parsed, reasons::UNCHANGED));
     }
     let named = named(&loaded);
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
-    // A camera that could not be read is tried again by the next request.
+    // Do not keep a scene whose orbiter file could not be read, so that the next request tries again.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key(content), parsed.clone());
     }
     Ok(Staged::done(parsed, ""))
 }
 
-/// A scene with the content of its file, the other files that it was made of, and approximations.
-type Read = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
+/// A scene with the content of its file, the other files it depends on, and its approximations.
+type ReadScene = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
 
 fn read(
-    origin: Origin<'_>,
+    origin: SceneSource<'_>,
     (contents, containers): (&Snapshot, &Containers),
     last: Option<&Arc<Parsed>>,
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<Read, Stop> {
-    let Origin { path, sets, .. } = origin;
+) -> Result<ReadScene, Stop> {
+    let SceneSource { path, sets, .. } = origin;
     if !is_model(path) {
         let loaded = scene::load(path, sets)
             .map_err(|errors| Stop::Failed(Failure::Scene(with_new_name(errors, path, last))))?;
@@ -175,8 +176,8 @@ fn read(
     Ok((Arc::new(loaded), content, companions, notes))
 }
 
-/// Key of a scene whose file has this content.
-fn key(Origin { path, sets, show }: Origin<'_>, content: Content, is_model: bool) -> Key {
+/// Returns the key of a scene whose file has this content.
+fn key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_model: bool) -> Key {
     let mut key = Fingerprint::new("parse");
     content.add_to(key.path(path));
     sets.iter().for_each(|set| {
@@ -188,7 +189,7 @@ fn key(Origin { path, sets, show }: Origin<'_>, content: Content, is_model: bool
     key.finish()
 }
 
-/// Adds to the error about a missing scene the name of a file that has the text of the last good one.
+/// Extends the error about a missing scene by the name of a file with the same text as the last valid scene.
 fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Parsed>>) -> Vec<Diagnostic> {
     let last = last.filter(|last| last.loaded.path == path);
     if let [error] = &mut errors[..]
@@ -202,11 +203,11 @@ fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Par
     errors
 }
 
-/// Files of the scene without the call's changes, with the files and pictures that only its unread meshes name.
+/// Returns the files that the scene references without the overrides, and the files that its unread meshes reference.
 fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
-    // What cannot be read names nothing that could be known.
+    // Unreadable files reference nothing.
     for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
         if let Ok(mesh) = load_mesh(path, &ignore_progress, &CancelToken::new()) {
             named.extend(mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures));
@@ -225,7 +226,7 @@ fn has_material_files(path: &Path) -> bool {
 
 type Orbiter = (Option<OrbiterCamera>, Option<Content>);
 
-/// The orbiter file of a camera that has one; its errors go to the findings.
+/// Reads the camera's orbiter file if it has one. Errors go to the findings.
 fn orbiter(
     loaded: &scene::Loaded,
     known: Option<&Parsed>,

@@ -1,6 +1,6 @@
-//! Photon maps. The stage makes what all passes have in common and the first of them; the others are sent during the render, when
-//! their samples are due. Maps are kept while there is room: pictures that differ in the camera or the exposure alone find them
-//! again, and those of another size if the scene says how many photons a pass has.
+//! The photons stage. It creates the data shared by all passes and traces the first pass. Later passes are traced
+//! during the render when their samples are due. Maps are kept while there is room, so that images with another camera
+//! or exposure reuse them, and images of another size do if the scene sets the number of photons per pass.
 
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
@@ -10,10 +10,10 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use rayon::ThreadPool;
 
 use super::super::cache::Memo;
-use super::super::pace::Stopwatch;
 use super::super::plan::Plan;
-use super::super::protocol::PhotonsReport;
+use super::super::protocol::{PhotonsReport, reasons};
 use super::super::sink::Sink;
+use super::super::stopwatch::Stopwatch;
 use super::super::trace::TICK;
 use super::{Staged, Stop};
 use crate::control::{CancelToken, Cancelled, Progress};
@@ -22,24 +22,21 @@ use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 use crate::world::World;
 
-/// Memory for maps that are kept from picture to picture.
+/// Maximum memory of maps kept for later images.
 const MOST_KEPT_BYTES: usize = 128 << 20;
-/// Memory for maps that are in use at once beside those, unless one alone takes more.
+/// Maximum memory of further maps in use at once, except that one map may be larger.
 const MOST_ALIVE_BYTES: usize = 256 << 20;
-/// Passes in use at once: looks into one at a time find more of it in the processor's caches.
+/// Maximum number of passes in use at once. Lookups in one map at a time use the CPU's caches better.
 const MOST_ALIVE: u32 = 1;
-/// Samples at once where no photons are sent.
+/// Maximum number of samples at once without photons.
 const MAX_WITHOUT_TREE: u32 = 4096;
 
-/// Why no photons are sent.
-const NOTHING_THROWS_LIGHT: &str = "no mirror or glass throws light";
-
-/// What the stage keeps: the photons of the last scene.
+/// Cache of the photons stage: the photons of the last scene.
 pub(crate) type PhotonCache = Memo<PhotonStore>;
 
-/// What passes are sent by.
+/// Context in which photon passes are traced.
 #[derive(Clone, Copy)]
-pub(crate) struct Sending<'a> {
+pub(crate) struct PhotonContext<'a> {
     pub(crate) world: &'a World,
     pub(crate) plan: &'a Plan,
     pub(crate) pool: &'a ThreadPool,
@@ -51,15 +48,15 @@ pub(crate) struct Sending<'a> {
 #[derive(Debug)]
 pub(crate) struct PhotonStore {
     photons: Photons,
-    /// The first passes.
+    /// Cached passes, from the first on.
     kept: RefCell<Vec<Arc<PhotonPass>>>,
-    /// What this request sent.
-    sent: Cell<Sent>,
+    /// Counts of the current request.
+    sent: Cell<PhotonCounts>,
 }
 
-/// What was sent for a picture.
+/// Counts of the photons traced for an image.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sent {
+struct PhotonCounts {
     passes: u64,
     emitted: u64,
     stored: u64,
@@ -69,12 +66,12 @@ struct Sent {
 }
 
 impl PhotonStore {
-    /// Whether each pass has photons: something throws light.
+    /// Whether photons are traced at all, because some surface causes caustics.
     pub(crate) fn are_sent(&self) -> bool {
         self.photons.emits_photons()
     }
 
-    /// Passes that may be in use at once, of the size of the first.
+    /// Returns how many passes as large as the first may be in use at once.
     pub(crate) fn at_once(&self) -> u32 {
         if !self.are_sent() {
             return MAX_WITHOUT_TREE;
@@ -83,20 +80,20 @@ impl PhotonStore {
         ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)
     }
 
-    /// Seconds that a pass takes to send; 0 where none was sent.
+    /// Average seconds to trace a pass. 0 if none was traced.
     pub(crate) fn seconds_of_pass(&self) -> f64 {
-        let Sent { passes, seconds, .. } = self.sent.get();
+        let PhotonCounts { passes, seconds, .. } = self.sent.get();
         if self.are_sent() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
 
-    /// The maps of some samples; `tick` is called every now and then.
+    /// Returns the maps of some samples. `tick` is called regularly.
     ///
     /// # Errors
-    /// Cancelled.
+    /// [`Cancelled`].
     pub(crate) fn maps(
         &self,
         samples: Range<u32>,
-        sending: Sending<'_>,
+        sending: PhotonContext<'_>,
         mut tick: impl FnMut(),
     ) -> Result<PhotonMaps, Cancelled> {
         let first = samples.start;
@@ -104,28 +101,28 @@ impl PhotonStore {
         let passes = samples.map(pass).collect::<Result<Vec<_>, _>>()?;
         let bytes = passes.iter().map(|pass| pass.memory_bytes()).sum();
         let sent = self.sent.get();
-        self.sent.set(Sent { most_alive_bytes: sent.most_alive_bytes.max(bytes), ..sent });
+        self.sent.set(PhotonCounts { most_alive_bytes: sent.most_alive_bytes.max(bytes), ..sent });
         Ok(PhotonMaps { first, passes })
     }
 
     fn pass(
         &self,
         number: u32,
-        sending: Sending<'_>,
+        sending: PhotonContext<'_>,
         tick: &mut impl FnMut(),
     ) -> Result<Arc<PhotonPass>, Cancelled> {
         let number_kept = if self.are_sent() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
         }
-        let Sending { world, plan, pool, token, .. } = sending;
+        let PhotonContext { world, plan, pool, token, .. } = sending;
         let watch = Stopwatch::start(token);
         let photons = &self.photons;
         let settings = plan.settings.effective();
         let pass = ticking(pool, tick, || photons.pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
-        self.sent.set(Sent {
+        self.sent.set(PhotonCounts {
             passes: sent.passes + 1,
             emitted: sent.emitted + pass.emitted,
             stored: sent.stored + pass.stored(),
@@ -145,9 +142,9 @@ impl PhotonStore {
         self.kept.borrow().iter().map(|pass| pass.memory_bytes()).sum()
     }
 
-    /// What was sent since the stage began, and what is kept.
+    /// Reports the photons traced since the stage began, and the cached maps.
     pub(crate) fn report(&self) -> PhotonsReport {
-        let Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
+        let PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes } = self.sent.get();
         let [caustic, bounced] = self.photons.radii();
         PhotonsReport {
             count: self.photons.count(),
@@ -165,7 +162,7 @@ impl PhotonStore {
     }
 }
 
-/// Do work in a pool, and `tick` on this thread.
+/// Runs work in the pool and calls `tick` on this thread.
 fn ticking<T: Send>(
     pool: &ThreadPool,
     tick: &mut impl FnMut(),
@@ -173,7 +170,7 @@ fn ticking<T: Send>(
 ) -> Result<T, Cancelled> {
     let (sender, result) = mpsc::sync_channel(1);
     pool.in_place_scope(|scope| {
-        // Its receiver is there until the result is.
+        // The receiver exists until the result arrives.
         scope.spawn(move |_| drop(sender.send(work())));
         loop {
             match result.recv_timeout(TICK) {
@@ -185,16 +182,16 @@ fn ticking<T: Send>(
     })
 }
 
-/// Make the first maps for a picture that gathers photons. `wanted` is what the command line says, `enabled` what the scene says;
-/// `tick` is called every now and then, `before` where photons have to be traced, before they are.
+/// Traces the first photons for an image that gathers them. `wanted` is from the command line, `enabled` from the
+/// scene. `tick` is called regularly, `before` once before any tracing.
 ///
 /// # Errors
-/// Cancelled; those of `before`.
+/// [`Stop::Cancelled`], and errors of `before`.
 pub(crate) fn photons(
     (enabled, wanted): (bool, Option<bool>),
     key: impl FnOnce(PhotonSettings) -> Key,
     cache: &mut PhotonCache,
-    sending: Sending<'_>,
+    sending: PhotonContext<'_>,
     mut tick: impl FnMut(),
     before: impl FnOnce() -> Result<(), Stop>,
 ) -> Result<Staged<()>, Stop> {
@@ -202,28 +199,28 @@ pub(crate) fn photons(
     let skipped = |why: &str| Ok(Staged::skipped((), why));
     let Some(of_photons) = settings.photons else {
         return match wanted.unwrap_or(enabled) {
-            true => skipped("path needs none"),
-            false if enabled => skipped("switched off for this run"),
-            false => skipped("the scene does not enable photons"),
+            true => skipped(reasons::NOT_USED_BY_PATH),
+            false if enabled => skipped(reasons::PHOTONS_OVERRIDDEN),
+            false => skipped(reasons::PHOTONS_OFF),
         };
     };
     if !settings.gathers() {
         let deeper = Render { max_depth: u32::MAX, ..settings.render };
         return skipped(match (RenderSettings { render: deeper, ..settings }).gathers() {
-            true => "max_depth 1 leaves no light to them",
-            false => "this view shows nothing of them",
+            true => reasons::TOO_FEW_BOUNCES,
+            false => reasons::NOT_NEEDED_FOR_VIEW,
         });
     }
     let key = key(of_photons);
     if let Some(store) = cache.get(key) {
-        store.sent.set(Sent::default());
+        store.sent.set(PhotonCounts::default());
         return Ok(match store.photons.emits_photons() {
-            true => Staged::reused((), "nothing that they meet changed"),
-            false => Staged::skipped((), NOTHING_THROWS_LIGHT),
+            true => Staged::reused((), reasons::UNCHANGED),
+            false => Staged::skipped((), reasons::NO_SPECULAR_SURFACES),
         });
     }
     before()?;
-    let Sending { world, pool, token, .. } = sending;
+    let PhotonContext { world, pool, token, .. } = sending;
     let watch = Stopwatch::start(token);
     let send = |progress: Progress<'_>| {
         ticking(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
@@ -231,10 +228,10 @@ pub(crate) fn photons(
     let (photons, first) = sending.sink.asset("photons", send)?;
     let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
-    let sent = Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
+    let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
     let are_sent = photons.emits_photons();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
-    Ok(if are_sent { Staged::done((), "") } else { Staged::skipped((), NOTHING_THROWS_LIGHT) })
+    Ok(if are_sent { Staged::done((), "") } else { Staged::skipped((), reasons::NO_SPECULAR_SURFACES) })
 }

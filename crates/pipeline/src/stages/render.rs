@@ -1,23 +1,24 @@
-//! Tracing: pass after pass into a film, with progress and previews on the way.
+//! The render stage: traces passes into a film, with progress and previews.
 //!
-//! The film is kept: an interrupted render goes on where it was, more samples are added to those that are there,
-//! and both give the bits of an uninterrupted one, because every sample is a function of its pixel and number and
-//! every pixel's sum has the order of its samples.
+//! The film is kept. An interrupted render resumes where it stopped, and more samples can be added to a finished one.
+//! Both give the same bits as an uninterrupted render: every sample is a function of its pixel and index, and every
+//! pixel sums its samples in order.
 
 use super::photons::PhotonStore;
 use super::{Staged, Stop};
 use crate::film::Convergence;
 use crate::integrators::RayCounters;
+use crate::protocol::reasons;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::render::scheduler::{Rendering, Scheduler};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::Key;
 
-/// Brings the film of this key to the requested samples or error.
+/// Renders the film with this key to the requested number of samples or noise.
 ///
 /// # Errors
-/// Cancelled; no memory for the film. The film keeps what it has.
+/// [`Stop::Cancelled`], or not enough memory for the film. The film keeps its samples.
 pub(crate) fn render(
     key: Key,
     films: &mut FilmCache,
@@ -34,8 +35,8 @@ pub(crate) fn render(
         let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
         let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
         let empty = films.put(state).map_err(Stop::work)?;
-        let is_of_use = match rendering.keeping.filter(|_| !rendering.force) {
-            Some(keeping) => keeping.resume(empty, wanted)?,
+        let is_of_use = match rendering.checkpointer.filter(|_| !rendering.force) {
+            Some(checkpointer) => checkpointer.resume(empty, wanted)?,
             None => true,
         };
         if !is_of_use {
@@ -53,10 +54,10 @@ pub(crate) fn render(
         scheduler.show();
         scheduler.state.traced = scheduler.traced();
         let why = match (is_part, is_resumed, is_other) {
-            (true, ..) => "the part is finished",
-            (false, true, _) => "the checkpoint has all samples",
-            (false, false, true) => "its film was kept",
-            (false, false, false) => "nothing that it shows changed",
+            (true, ..) => reasons::PART_COMPLETE,
+            (false, true, _) => reasons::CHECKPOINT_COMPLETE,
+            (false, false, true) => reasons::CACHED,
+            (false, false, false) => reasons::UNCHANGED,
         };
         return Ok(Staged::reused(scheduler.rays, why));
     }
@@ -67,15 +68,15 @@ pub(crate) fn render(
     Ok(match (!scheduler.state.is_complete(wanted), had) {
         (true, _) => {
             state.ended_by = budget;
-            Staged::done(rays, "the time was up")
+            Staged::done(rays, reasons::TIME_LIMIT_REACHED)
         }
         (false, _) if state.goals.are_below(wanted) => {
             let missed = state.missed(error.into()).map_or_else(String::new, |(tiles, worst)| {
-                format!("; of {tiles}, where few pixels have it, it is up to {worst:.2}")
+                format!("; {tiles} with few noisy pixels: up to {worst:.2}")
             });
-            Staged::done(rays, format!("the noise of some tiles is below {error}{missed}"))
+            Staged::done(rays, format!("{}{missed}", reasons::NOISE_TARGET_REACHED))
         }
         (false, 0) => Staged::done(rays, ""),
-        (false, _) => Staged::done(rays, format!("went on after {had} samples")),
+        (false, _) => Staged::done(rays, reasons::resumed_after(had)),
     })
 }

@@ -1,4 +1,4 @@
-//! Encoding and writing pictures, each only when it would differ from what was written.
+//! The write stage: encodes and writes images that differ from those already written.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -7,11 +7,11 @@ use serde_json::Value;
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
-use super::super::protocol::Writing;
+use super::super::protocol::{Writing, reasons};
+use super::super::render::checkpointer::head;
 use super::super::render::film_state::FilmState;
-use super::super::render::keeping::head;
 use super::super::sink::Sink;
-use super::super::targets::{Target, conflicts, guarded};
+use super::super::targets::{OutputTarget, conflicts, guarded};
 use super::super::turntable::Turn;
 use super::super::watch::content::{Content, Contents};
 use super::{Staged, Stop};
@@ -26,25 +26,25 @@ use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError, sce
 use crate::output::{MovingFormat, moving};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Name of the scene in the metadata.
+/// Metadata key of the scene file.
 const SCENE: &str = "glimt:scene";
 
-/// Files that glimt wrote.
+/// Images that glimt wrote.
 #[derive(Debug, Default)]
-pub(crate) struct Written {
-    /// Each with the picture's key and the file's content at that time.
+pub(crate) struct WrittenFiles {
+    /// Each file with the image's key and the file's content after the write.
     files: HashMap<PathBuf, (Key, Content)>,
-    /// The scene's own image, if all its files hold it.
+    /// Key of the scene's own image, if all its files contain it.
     pub(crate) own: Option<Key>,
     /// Folders of this write, or of the images of a turntable so far, without temporary files of killed writers.
     sweep: FolderSweep,
 }
 
-impl Written {
-    /// The first of these paths that exists and holds something else than glimt wrote there.
+impl WrittenFiles {
+    /// Returns the first path that exists with a content that glimt did not write.
     pub(crate) fn not_ours<'a>(&self, paths: &'a [PathBuf], contents: &Contents) -> Option<&'a Path> {
         let holds = |path: &Path, known: &Content| {
-            // A token that nobody cancels.
+            // This token is never cancelled.
             contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
         };
         let is_ours = |path: &Path| self.files.get(path).is_some_and(|(_, known)| holds(path, known));
@@ -52,35 +52,35 @@ impl Written {
         paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
     }
 
-    /// Whether there is none.
+    /// Whether no file was written.
     pub(crate) fn is_empty(&self) -> bool {
         self.files.is_empty()
     }
 
-    /// Write everything next time.
+    /// Forgets all files, so that the next write writes them again.
     fn forget(&mut self) {
         self.files.clear();
         self.own = None;
     }
 }
 
-/// Destination of pictures, and files that must not be lost there.
+/// Output files of an image, and files that must not be overwritten.
 #[derive(Clone, Copy)]
 pub(crate) struct Destination<'a> {
     pub(crate) plan: &'a Plan,
-    /// Layers of the picture for EXR files.
+    /// Image layers for EXR files.
     pub(crate) layers: &'a [LayerImage],
     pub(crate) inputs: &'a Inputs,
     pub(crate) contents: &'a Contents,
-    /// Whether the picture is the scene's own image, not one that keys changed.
+    /// Whether the image is the scene's own, without changes made by keys.
     pub(crate) is_own: bool,
     pub(crate) sink: &'a Sink,
 }
 
-/// Look at all targets before work is put into a picture for them, and say what is wrong.
+/// Checks all output files before any work is spent on an image for them.
 ///
 /// # Errors
-/// The first that cannot be written, where it must be.
+/// With [`Writing::Must`], the first file that cannot be written. Otherwise failures are reported as events.
 pub(crate) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
     match writing {
         Writing::No => Ok(()),
@@ -108,41 +108,41 @@ fn find_targets(
         )
     };
     match plan.shard {
-        // A part has any ending.
+        // A part may have any extension.
         Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
-        // Nothing that is in the way of a later image of a turntable is found when hours of work are done.
-        None => plan.outputs.iter().chain(&plan.to_come).try_for_each(check)?,
+        // Check the later turntable frames as well, so that no problem appears after hours of work.
+        None => plan.outputs.iter().chain(&plan.later_outputs).try_for_each(check)?,
     }
     plan.moving.iter().try_for_each(|path| place(path))?;
     plan.report.iter().try_for_each(|path| place(path))
 }
 
-/// The last stage of a request; whether the picture is on disk then.
+/// Runs the last stage of a request. Returns whether the image is on disk.
 ///
 /// # Errors
-/// What went wrong, where the picture must be written.
+/// With [`Writing::Must`], why the image could not be written.
 pub(crate) fn write_if_wanted(
     writing: Writing,
-    canvas: &FilmState,
+    state: &FilmState,
     to: Destination<'_>,
-    written: &mut Written,
+    written: &mut WrittenFiles,
     token: &CancelToken,
 ) -> Result<Staged<bool>, Stop> {
     match writing {
-        Writing::No => Ok(Staged::skipped(false, "nothing is to be written")),
-        Writing::Try | Writing::Must => write(canvas, to, written, token, writing == Writing::Must),
+        Writing::No => Ok(Staged::skipped(false, reasons::PREVIEW_ONLY)),
+        Writing::Try | Writing::Must => write(state, to, written, token, writing == Writing::Must),
     }
 }
 
-/// Write the film as it is to every output that does not hold it already. All outputs are tried, and failures are reported as events.
-/// Returns whether all outputs hold it.
+/// Writes the film to every output that does not contain it already. Tries all outputs and reports failures as events.
+/// Returns whether all outputs contain it.
 ///
 /// # Errors
-/// Cancelled; or, if the picture must be written, the last file that could not be, and why.
+/// [`Stop::Cancelled`]. If `is_must`, why the last failed file could not be written.
 fn write(
-    canvas: &FilmState,
+    state: &FilmState,
     to: Destination<'_>,
-    written: &mut Written,
+    written: &mut WrittenFiles,
     token: &CancelToken,
     is_must: bool,
 ) -> Result<Staged<bool>, Stop> {
@@ -153,7 +153,7 @@ fn write(
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
-        let key = key(canvas, plan, path);
+        let key = key(state, plan, path);
         if let Some((known, content)) = written.files.get(path)
             && *known == key
             && contents.read(path, token)? == *content
@@ -161,21 +161,21 @@ fn write(
             continue;
         }
         contents.outputs.begin(path);
-        let wrote = match canvas.share {
-            Some(_) => write_part(canvas, to, (path, &written.sweep), token),
+        let wrote = match state.share {
+            Some(_) => write_part(state, to, (path, &written.sweep), token),
             None => {
-                let image = radiance.get_or_insert_with(|| canvas.film.image(plan.settings.view.quantity()));
+                let image = radiance.get_or_insert_with(|| state.film.image(plan.settings.view.quantity()));
                 token
                     .check()
                     .map_err(OutputError::from)
-                    .and_then(|()| write_one(image, canvas, to, (path, &written.sweep), token))
+                    .and_then(|()| write_one(image, state, to, (path, &written.sweep), token))
             }
         };
         match wrote {
             Ok(bytes) => {
                 count += 1;
-                // The picture is on disk: a cancel from here on does not undo that. Look at the content before anybody hears of
-                // the file and may change it.
+                // The image is on disk, so a cancellation no longer matters. Record the content before other programs
+                // learn about the file and may change it.
                 let content = contents.read(path, &CancelToken::new())?;
                 contents.outputs.end(path, Some(content));
                 written.files.insert(path.clone(), (key, content));
@@ -195,28 +195,29 @@ fn write(
     contents.outputs.retain(|path| outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
-            // Report each failure by itself, but for the last one if that is the reason why the request fails.
+            // Report each failure separately, except for the last one if the request fails with it.
             let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
             errors.truncate(errors.len() - usize::from(is_must));
             errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
             if is_must { Err(Stop::work(last)) } else { Ok(Staged::skipped(false, last)) }
         }
-        (true, 0) => Ok(Staged::reused(true, "the picture is on disk")),
+        (true, 0) => Ok(Staged::reused(true, reasons::ALREADY_WRITTEN)),
         (true, 1) => Ok(Staged::done(true, "")),
         (true, _) => Ok(Staged::done(true, format!("{count} files"))),
     }
 }
 
-/// [`write`] by a person's order, whatever is on disk. Failures are reported as events. Returns whether all outputs hold the picture.
-pub(crate) fn write_by_hand(canvas: &FilmState, to: Destination<'_>, written: &mut Written) -> bool {
+/// Writes the image at the user's request even if it is on disk. Reports failures as events. Returns whether all
+/// outputs contain it.
+pub(crate) fn write_by_hand(state: &FilmState, to: Destination<'_>, written: &mut WrittenFiles) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         to.sink.refused(conflicts);
         return false;
     }
     written.forget();
-    // Nobody cancels this token: a person ordered this picture. Events tell what failed.
-    let outcome = write(canvas, to, written, &CancelToken::new(), false);
+    // This token is never cancelled, because the user asked for the image. Failures are reported as events.
+    let outcome = write(state, to, written, &CancelToken::new(), false);
     let is_written = outcome.is_ok_and(|stage| stage.value);
     if is_written {
         to.sink.write_done(to.plan.outputs.clone());
@@ -224,27 +225,28 @@ pub(crate) fn write_by_hand(canvas: &FilmState, to: Destination<'_>, written: &m
     is_written
 }
 
-/// Frames of a turntable so far, each with its samples.
+/// Finished frames of a turntable, with their sample counts.
 #[derive(Debug, Default)]
 pub(crate) struct Frames(Vec<(Picture, SampleStats)>);
 
-/// Adds the picture to the frames of its turntable; with the last one, writes the moving pictures. Returns whether they are on disk.
+/// Adds an image to the frames of its turntable. After the last frame, writes the animations. Returns whether they are
+/// on disk.
 ///
 /// # Errors
-/// The first file that could not be written, and why. Or cancelled.
+/// [`Stop::Cancelled`], or why a file could not be written.
 pub(crate) fn write_moving(
-    canvas: &FilmState,
+    state: &FilmState,
     to: Destination<'_>,
     (turn, frames): (Turn, &mut Frames),
     token: &CancelToken,
 ) -> Result<Staged<bool>, Stop> {
     let Destination { plan, inputs, sink, .. } = to;
     let finish = finish(plan);
-    let image = finish.image(&canvas.film);
+    let image = finish.image(&state.film);
     frames.0.truncate(turn.number as usize);
-    frames.0.push((develop(&image, &finish.tone.resolved_for(&image)), canvas.film.samples()));
+    frames.0.push((develop(&image, &finish.tone.resolved_for(&image)), state.film.samples()));
     if !turn.is_last() {
-        return Ok(Staged::skipped(false, format!("it is kept as frame {} of {}", turn.number + 1, turn.of)));
+        return Ok(Staged::skipped(false, format!("frame {} of {}", turn.number + 1, turn.of)));
     }
     let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(frames).0.into_iter().unzip();
     let samples = SampleStats {
@@ -258,7 +260,7 @@ pub(crate) fn write_moving(
             let metadata = finish_at(plan, path).metadata_with(samples);
             let bytes = moving::encode(&frames, &metadata, format, token)?;
             let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
-            guarded(plan, inputs, (Target::picture(plan, path), None), sink, write)?;
+            guarded(plan, inputs, (OutputTarget::picture(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
         match write() {
@@ -272,40 +274,40 @@ pub(crate) fn write_moving(
 
 fn write_one(
     image: &RadianceImage,
-    canvas: &FilmState,
+    state: &FilmState,
     Destination { plan, layers, inputs, sink, .. }: Destination<'_>,
     (path, sweep): (&Path, &FolderSweep),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let mut finish = finish_at(plan, path);
-    // A budget that suffices changes nothing.
-    if let Some(seconds) = canvas.ended_by {
+    // Record a time limit only if it ended the render.
+    if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
-    let bytes = finish.encode(&canvas.film, (image, layers), Format::of(path)?, token)?;
-    let target = (Target::picture(plan, path), Some(sweep));
+    let bytes = finish.encode(&state.film, (image, layers), Format::of(path)?, token)?;
+    let target = (OutputTarget::picture(plan, path), Some(sweep));
     guarded(plan, inputs, target, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 
-/// Writes the part of a picture that this process rendered.
+/// Writes the part of an image that this process rendered.
 fn write_part(
-    canvas: &FilmState,
+    state: &FilmState,
     Destination { plan, inputs, sink, .. }: Destination<'_>,
     (path, sweep): (&Path, &FolderSweep),
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let identity = canvas.identity.clone().unwrap_or_default();
+    let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative(&plan.path, path);
-    let head = Head { scene, ..head(Kind::Part, canvas, identity, &finish(plan)) };
+    let head = Head { scene, ..head(Kind::Part, state, identity, &finish(plan)) };
     let save = |guard: &Guard<'_>| {
-        part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
+        part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
-    guarded(plan, inputs, (Target::picture(plan, path), Some(sweep)), sink, save)?;
+    guarded(plan, inputs, (OutputTarget::picture(plan, path), Some(sweep)), sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
 
-/// Settings that turn a film into the files of a plan.
+/// Returns the settings with which a film is developed and encoded.
 pub(crate) fn finish(plan: &Plan) -> Finish {
     Finish {
         quantity: plan.settings.view.quantity(),
@@ -316,7 +318,7 @@ pub(crate) fn finish(plan: &Plan) -> Finish {
     }
 }
 
-/// [`finish`] for an image at a path, which names the scene relative to itself.
+/// Like [`finish`], with the scene's path relative to the image.
 fn finish_at(plan: &Plan, path: &Path) -> Finish {
     let mut finish = finish(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
@@ -326,7 +328,7 @@ fn finish_at(plan: &Plan, path: &Path) -> Finish {
     finish
 }
 
-/// Metadata of a picture: enough to make it again, beside what its film tells.
+/// Returns the metadata with which an image can be reproduced, apart from the film's own.
 fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let pairs = [
@@ -366,10 +368,10 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
     pairs
 }
 
-fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {
-    let SampleStats { min, mean, max } = canvas.film.samples();
+fn key(state: &FilmState, plan: &Plan, path: &Path) -> Key {
+    let SampleStats { min, mean, max } = state.film.samples();
     let mut key = Fingerprint::new("write");
-    key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
+    key.key(&state.key).u64(min.into()).f64(mean).u64(max.into());
     key.choice(plan.settings.view).f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
     key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
     plan.layers.iter().for_each(|layer| {

@@ -1,9 +1,9 @@
-//! Tiles that stop by their noise.
+//! Tests of tiles that stop early when their noise is low enough.
 
 use super::Bench;
-use crate::protocol::{Section, Stage};
+use crate::protocol::{Section, Stage, reasons};
 
-/// A lamp over a floor with a ball: penumbras in some tiles, next to nothing in others.
+/// An area light above a floor with a ball: penumbras in some tiles, almost no noise in others.
 const LIT: &str = r#"
 [render]
 width = 128
@@ -34,21 +34,21 @@ material = "lamp"
 "#;
 
 #[test]
-fn smooth_tiles_stop_and_noisy_ones_go_on() {
+fn smooth_tiles_stop_and_noisy_ones_continue() {
     let mut bench = Bench::new(LIT);
     let report = bench.done().0;
     assert_eq!(report.image.samples.min, 16);
     assert!(report.image.samples.max > 32, "{:?}", report.image.samples);
     assert!(report.image.complete);
     let why = &report.stages[Stage::Render as usize].why;
-    assert!(why.contains("below 0.02"), "{why}");
+    assert!(why.starts_with(reasons::NOISE_TARGET_REACHED), "{why}");
     bench.overrides.error = Some(0.0);
     let report = bench.done().0;
     assert_eq!((report.image.samples.min, report.image.samples.max), (256, 256));
 }
 
 #[test]
-fn it_has_the_same_bits_whatever_the_threads_and_the_way_there() {
+fn bits_do_not_depend_on_threads_or_history() {
     let mut pictures = Vec::new();
     for threads in [1, 2, 7] {
         let mut bench = Bench::new(LIT);
@@ -56,14 +56,14 @@ fn it_has_the_same_bits_whatever_the_threads_and_the_way_there() {
         bench.done();
         pictures.push(bench.picture());
     }
-    // More samples asked for on the way, at a power of two and beside one.
+    // Request more samples in several steps, to a power of two and to another number.
     let mut bench = Bench::new(LIT);
     for samples in [16, 40, 256] {
         bench.overrides.samples = Some(samples);
         bench.done();
     }
     pictures.push(bench.picture());
-    // A part of it before the rest.
+    // Render a region first.
     let mut bench = Bench::new(LIT);
     bench.first = Some(Section { left: 0.3, top: 0.2, width: 0.3, height: 0.4 });
     bench.done();
@@ -72,7 +72,7 @@ fn it_has_the_same_bits_whatever_the_threads_and_the_way_there() {
 }
 
 #[test]
-fn a_budget_of_time_puts_samples_where_they_lower_the_error_most() {
+fn time_limit_favors_noisy_parts() {
     let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
     bench.overrides.samples = Some(1 << 20);
     let samples = [0.2, 0.8, 3.2, 12.8, 51.2].into_iter().find_map(|seconds| {
@@ -85,7 +85,7 @@ fn a_budget_of_time_puts_samples_where_they_lower_the_error_most() {
 }
 
 #[test]
-fn a_budget_of_time_that_suffices_changes_nothing() {
+fn sufficient_time_limit_changes_nothing() {
     let mut bench = Bench::new(&LIT.replace("error = 0.02", "error = 0"));
     bench.overrides.samples = Some(100);
     bench.done();

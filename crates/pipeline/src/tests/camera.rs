@@ -1,11 +1,12 @@
-//! A camera that is moved by the front end.
+//! Tests of a camera that the front end moves.
 
 use super::*;
 use crate::math::DVec3;
-use crate::protocol::{CameraEdit, Kept, MovedCamera, Picked, Spot};
+use crate::messages;
+use crate::protocol::{CameraEdit, ImagePosition, Kept, MovedCamera, Picked};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
-/// A mirror, and photons that it throws.
+/// A mirror, and photons that it reflects.
 const PHOTONS: &str = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n\
     [materials.steel]\ntype = \"mirror\"\n[photons]\nenabled = true\ncount = 500\n";
 
@@ -14,7 +15,7 @@ fn moved() -> CameraChange {
     CameraChange { pose: Some(pose), fov: Some(35.0), focus: None }
 }
 
-/// The camera of a request: the scene's own, as the request says it, with what the front end changes.
+/// Returns the camera of a request: the scene's own, with the changes of the front end.
 fn camera(bench: &mut Bench) -> Viewpoint {
     let of = bench.send();
     let events = bench.until_end(of);
@@ -27,7 +28,7 @@ fn camera(bench: &mut Bench) -> Viewpoint {
 }
 
 #[test]
-fn a_moved_camera_keeps_trees_lights_and_photons() {
+fn moved_camera_reuses_trees_lights_and_photons() {
     let mut bench = Bench::new(&format!("{SCENE}{PHOTONS}"));
     bench.done();
     let own = bench.picture();
@@ -36,14 +37,14 @@ fn a_moved_camera_keeps_trees_lights_and_photons() {
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrrds");
     assert_eq!(report.counters.photons_emitted, 0);
-    assert_eq!(bench.picture(), own, "it is shown alone");
+    assert_eq!(bench.picture(), own, "it is not written");
     bench.overrides.camera = CameraChange::default();
     bench.writing = Writing::Must;
     assert_statuses(&bench.done().0, "rrrrrrrr");
 }
 
 #[test]
-fn a_moved_camera_gives_the_picture_that_the_file_would() {
+fn moved_camera_renders_like_the_edited_file() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.camera = moved();
     bench.done();
@@ -57,7 +58,7 @@ fn a_moved_camera_gives_the_picture_that_the_file_would() {
 }
 
 #[test]
-fn the_plane_in_focus_goes_with_what_is_looked_at_unless_the_scene_says_where_it_is() {
+fn focus_follows_look_at_unless_set() {
     for (scene, expected) in [
         (SCENE.to_owned(), moved().pose.expect("a pose").distance()),
         (SCENE.replace("[camera]", "[camera]\nfocus = 2.5"), 2.5),
@@ -71,7 +72,7 @@ fn the_plane_in_focus_goes_with_what_is_looked_at_unless_the_scene_says_where_it
 }
 
 #[test]
-fn an_orbiter_camera_is_moved_by_vectors() {
+fn orbiter_camera_can_be_moved() {
     let orbiter = SCENE.replace("position = [0, 1, 4]\nlook_at = [0, 1, 0]", "orbiter = \"camera.txt\"");
     let mut bench = Bench::new(&orbiter);
     bench.write("camera.txt", "c 0 1 0\np 0 0\nr 0 0\ns 4 5\nf 40 4 3\n");
@@ -86,7 +87,7 @@ fn an_orbiter_camera_is_moved_by_vectors() {
     assert_eq!(other.picture(), shown);
 }
 
-/// The answer to an errand.
+/// Sends a query and waits for its answer.
 fn answer(bench: &mut Bench, command: Command) -> Event {
     bench.worker.send(command);
     loop {
@@ -101,7 +102,7 @@ fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<Kept, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
-/// The same, of a camera that was moved from this one of the scene.
+/// Like [`keep`], for a camera that was moved from another one than the scene's.
 fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<Kept, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
@@ -117,14 +118,14 @@ fn undo(bench: &mut Bench, edit: CameraEdit) -> Result<std::path::PathBuf, Strin
 }
 
 fn pick(bench: &mut Bench, x: f64, y: f64) -> Picked {
-    match answer(bench, Command::Pick(Spot { x, y })) {
+    match answer(bench, Command::Pick(ImagePosition { x, y })) {
         Event::Picked { picked, .. } => *picked,
         other => panic!("{other:?}"),
     }
 }
 
 #[test]
-fn a_camera_that_is_kept_renders_nothing_anew() {
+fn kept_camera_renders_nothing_again() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.camera = moved();
     let camera = camera(&mut bench);
@@ -143,33 +144,33 @@ fn a_camera_that_is_kept_renders_nothing_anew() {
 }
 
 #[test]
-fn a_file_that_changed_is_not_written_over() {
+fn changed_file_is_not_overwritten() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.camera = moved();
     let camera = camera(&mut bench);
-    bench.edit("[camera]", "# somebody else\n[camera]");
+    bench.edit("[camera]", "# another edit\n[camera]");
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
     let why = keep(&mut bench, camera).expect_err("refused");
-    assert!(why.contains("changed since it was read"), "{why}");
+    assert!(why == messages::SCENE_FILE_CHANGED, "{why}");
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
     bench.done();
     assert!(keep(&mut bench, camera).expect("read again").is_new);
 }
 
 #[test]
-fn a_camera_of_before_a_save_is_not_written_over_the_camera_of_that_save() {
+fn camera_from_before_a_save_is_not_kept() {
     let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
     bench.done();
     let own = bench.own.get().expect("a camera");
     let moved = own.changed(&CameraChange { fov: None, ..moved() });
-    // The worker has read the save when it hears of the camera that was moved before.
+    // The worker has read the edited file before it receives the camera.
     bench.edit("fov = 34", "fov = 20");
     bench.done();
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
     let why = keep_moved_from(&mut bench, moved, own).expect_err("refused");
-    assert!(why.contains("camera has changed") && why.contains("press c again"), "{why}");
+    assert_eq!(why, messages::CAMERA_CHANGED);
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
-    // Moved from the camera that the file has now, it is written, and the save stays.
+    // A camera moved from the file's current camera is written, and the edit remains.
     let moved = Viewpoint { fov: 20.0, ..moved };
     assert!(keep(&mut bench, moved).expect("written").is_new);
     let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
@@ -177,46 +178,46 @@ fn a_camera_of_before_a_save_is_not_written_over_the_camera_of_that_save() {
 }
 
 #[test]
-fn a_kept_camera_is_taken_back_to_the_byte() {
+fn undo_restores_every_byte() {
     let mut bench = Bench::new(SCENE);
     let text = |bench: &Bench| fs::read_to_string(bench.path("scene.toml")).expect("a scene");
     bench.overrides.camera = moved();
     let camera = camera(&mut bench);
     let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
     let kept = text(&bench);
-    // What somebody wrote since is left alone, before and after glimt has read it.
-    bench.edit("[camera]", "# somebody else\n[camera]");
+    // Later edits remain, before and after glimt has read them.
+    bench.edit("[camera]", "# another edit\n[camera]");
     let edited = text(&bench);
     for _ in 0..2 {
         let why = undo(&mut bench, edit.clone()).expect_err("refused");
-        assert!(why.contains("has changed since c wrote it"), "{why}");
+        assert!(why.contains("scene.toml"), "{why}");
         assert_eq!(text(&bench), edited);
         bench.done();
     }
-    // Once the file is again as it was left, it goes back.
+    // After the edit is reverted, the undo succeeds.
     fs::write(bench.path("scene.toml"), &kept).expect("written");
     assert_eq!(undo(&mut bench, edit.clone()), Ok(bench.path("scene.toml")));
     assert_eq!(text(&bench), SCENE);
-    assert!(undo(&mut bench, edit).is_err(), "there is nothing of it left");
+    assert!(undo(&mut bench, edit).is_err(), "the edit is already undone");
     assert_eq!(text(&bench), SCENE);
 }
 
 #[test]
-fn a_scene_file_that_is_gone_is_said_to_be_gone() {
+fn missing_scene_file_is_reported() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.camera = moved();
     let camera = camera(&mut bench);
     let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
     fs::remove_file(bench.path("scene.toml")).expect("removed");
     let why = undo(&mut bench, edit).expect_err("refused");
-    assert!(why.ends_with("scene.toml is gone: there is nothing to undo in it"), "{why}");
+    assert!(why.contains("scene.toml"), "{why}");
     let why = keep(&mut bench, camera).expect_err("refused");
-    assert_eq!(why, "the scene file is gone: the camera is not written");
+    assert_eq!(why, messages::SCENE_FILE_MISSING);
     assert!(!bench.path("scene.toml").exists());
 }
 
 #[test]
-fn a_kept_camera_follows_links_and_keeps_permissions() {
+fn kept_camera_follows_links_and_keeps_permissions() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let mut bench = Bench::new(SCENE);
     let real = bench.path("real.toml");
@@ -232,10 +233,10 @@ fn a_kept_camera_follows_links_and_keeps_permissions() {
 }
 
 #[test]
-fn a_kept_camera_keeps_the_attributes_of_the_file() {
+fn kept_camera_keeps_file_attributes() {
     let mut bench = Bench::new(SCENE);
     let path = bench.path("scene.toml");
-    // A file system without them has nothing to lose.
+    // Skip file systems without extended attributes.
     if xattr::set(&path, "user.note", b"mine").is_err() {
         return;
     }
@@ -246,7 +247,7 @@ fn a_kept_camera_keeps_the_attributes_of_the_file() {
 }
 
 #[test]
-fn a_file_that_would_lose_something_keeps_its_camera() {
+fn camera_is_not_kept_if_the_file_loses_metadata() {
     for (why, is_linked) in [("has other hard links", true), ("is read-only", false)] {
         let mut bench = Bench::new(SCENE);
         let path = bench.path("scene.toml");
@@ -266,7 +267,7 @@ fn a_file_that_would_lose_something_keeps_its_camera() {
 }
 
 #[test]
-fn what_the_call_sets_stays_before_the_file() {
+fn command_line_overrides_the_kept_camera() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.sets = vec!["camera.fov=20".to_owned()];
     bench.overrides.camera = moved();
@@ -277,7 +278,7 @@ fn what_the_call_sets_stays_before_the_file() {
 }
 
 #[test]
-fn what_is_at_a_place_is_said() {
+fn pick_identifies_object_and_material() {
     let mut bench = Bench::new(&SCENE.replace("center = [0, 1, 0]", "name = \"globe\"\ncenter = [0, 1, 0]"));
     bench.done();
     let middle = pick(&mut bench, 0.5, 0.5);
@@ -301,20 +302,20 @@ fn what_is_at_a_place_is_said() {
 }
 
 #[test]
-fn a_render_under_way_answers_and_goes_on() {
+fn running_render_answers_and_continues() {
     let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 1000000"));
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
     assert!(pick(&mut bench, 0.5, 0.5).thing.is_some());
     let camera = Viewpoint { pose: moved().pose.expect("a pose"), fov: 40.0, aperture: 0.0, focus: 1.0 };
     assert!(keep(&mut bench, camera).expect("written").is_new);
-    assert!(matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }), "it goes on");
+    assert!(matches!(bench.next(), Event::Progress { .. } | Event::Preview { .. }), "the render continues");
     bench.worker.send(Command::Cancel);
     bench.until_end(of);
 }
 
 #[test]
-fn a_material_of_a_mesh_file_is_named() {
+fn pick_names_materials_of_mesh_files() {
     let mut bench =
         Bench::new("[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[[mesh]]\nfile = \"two.obj\"\n");
     bench.write("two.mtl", "newmtl chalk\nKd 1 1 1\n");
@@ -322,6 +323,6 @@ fn a_material_of_a_mesh_file_is_named() {
     bench.write("two.obj", &format!("mtllib two.mtl\n{}{}", half(1, ""), half(-1, "usemtl chalk")));
     bench.done();
     let mut material = |x| pick(&mut bench, x, 0.6).thing.expect("a half").material;
-    assert_eq!(material(0.45), "chalk, of the file");
-    assert_eq!(material(0.55), "none of the file");
+    assert_eq!(material(0.45), "chalk (in the file)");
+    assert_eq!(material(0.55), "no material in the file");
 }

@@ -1,4 +1,4 @@
-//! The worker driven by messages, as front ends do it.
+//! Tests that drive the worker with messages, as front ends do.
 
 mod adaptive;
 mod camera;
@@ -15,10 +15,10 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::engine::Means;
+use crate::engine::EngineConfig;
 use crate::protocol::{
-    Command, Event, Failure, LatestPreview, PreviewSize, Report, Request, Section, Spot, Stage, Status,
-    Writing,
+    Command, Event, Failure, ImagePosition, LatestPreview, PreviewSize, Report, Request, Section, Stage,
+    Status, Writing, reasons,
 };
 use crate::scene::Loaded;
 use crate::scene::description::Viewpoint;
@@ -27,7 +27,7 @@ use crate::settings::Overrides;
 use crate::trace::Kernel;
 use crate::worker::{Handle, start_with};
 
-/// The scene of this text, with a camera added if it has none.
+/// Loads a scene from text, and adds a camera if it has none.
 pub(crate) fn loaded_of(text: &str) -> Loaded {
     let place = "position = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
     let text = if text.contains("[camera]\n") {
@@ -78,7 +78,7 @@ pub(super) const KERNEL: Kernel = crate::integrators::render_tile_with_photons;
 
 pub(crate) struct Bench {
     pub(super) folder: tempfile::TempDir,
-    /// Name of the scene, or of the model.
+    /// Name of the scene or model file.
     pub(super) scene: &'static str,
     pub(super) worker: Handle,
     pub(super) generation: u64,
@@ -87,7 +87,7 @@ pub(crate) struct Bench {
     pub(super) force: bool,
     pub(super) first: Option<Section>,
     pub(super) writing: Writing,
-    /// The scene's own camera, as the worker said it last.
+    /// Camera of the scene, as last reported by the worker.
     pub(super) own: Cell<Option<Viewpoint>>,
 }
 
@@ -97,14 +97,14 @@ impl Bench {
     }
 
     pub(super) fn with(scene: &str, kernel: Kernel) -> Self {
-        Self::with_means(scene, Means { kernel, ..Means::default() })
+        Self::with_config(scene, EngineConfig { kernel, ..EngineConfig::default() })
     }
 
-    pub(super) fn with_means(scene: &str, means: Means) -> Self {
+    pub(super) fn with_config(scene: &str, config: EngineConfig) -> Self {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let output = folder.path().join("out.ppm");
         let overrides = Overrides { outputs: vec![output], threads: Some(2), ..Default::default() };
-        let worker = start_with(means).expect("a thread");
+        let worker = start_with(config).expect("a thread");
         let bench = Self {
             folder,
             scene: "scene.toml",
@@ -153,14 +153,15 @@ impl Bench {
     }
 
     pub(super) fn next(&self) -> Event {
-        let event = self.worker.events.recv_timeout(Duration::from_secs(60)).expect("the worker speaks");
+        let event =
+            self.worker.events.recv_timeout(Duration::from_secs(60)).expect("an event within a minute");
         if let Event::Settings { camera, .. } = &event {
             self.own.set(Some(*camera));
         }
         event
     }
 
-    /// All events up to the one that ends this generation.
+    /// Receives all events up to the end of this generation.
     pub(super) fn until_end(&self, of: u64) -> Vec<Event> {
         let mut events = Vec::new();
         loop {
@@ -204,7 +205,7 @@ impl Bench {
     }
 }
 
-/// `d`one, `r`eused or `s`kipped for each stage in order.
+/// Returns `d`one, `r`eused or `s`kipped for each stage in order.
 pub(super) fn statuses(report: &Report) -> String {
     let names: Vec<Stage> = report.stages.iter().map(|stage| stage.name).collect();
     assert_eq!(names, Stage::ALL);

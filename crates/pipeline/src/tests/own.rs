@@ -1,14 +1,14 @@
-//! The scene's own image, while keys show something else.
+//! Tests of the scene's own image while keys show another one.
 
 use super::*;
 use crate::protocol::OwnState;
 use crate::scene::description::Shadows;
 use crate::settings::{Checkpoints, Resume, View};
 
-/// A front end whose keys show something else than the scene's own image.
-struct Keys(Bench);
+/// A front end whose keys show another image than the scene's own.
+struct ToggledBench(Bench);
 
-impl Keys {
+impl ToggledBench {
     fn new() -> Self {
         let mut bench = Bench::new(SCENE);
         bench.writing = Writing::Try;
@@ -21,7 +21,7 @@ impl Keys {
         Self(bench)
     }
 
-    /// Requests what keys show.
+    /// Requests an image changed by keys.
     fn show(&mut self, change: impl FnOnce(&mut Overrides)) -> u64 {
         let own = self.0.overrides.clone();
         change(&mut self.0.overrides);
@@ -40,7 +40,7 @@ impl Keys {
         self.0.generation
     }
 
-    /// All events of a request that keys show something else in.
+    /// Requests an image changed by keys and returns all events.
     fn shown(&mut self, change: impl FnOnce(&mut Overrides)) -> Vec<Event> {
         let of = self.show(change);
         self.0.until_end(of)
@@ -49,6 +49,13 @@ impl Keys {
 
 fn no_shadows(overrides: &mut Overrides) {
     overrides.shadows = Some(Shadows::Off);
+}
+
+/// Asserts that a render continued from existing samples.
+#[track_caller]
+fn assert_resumed(report: &Report) {
+    let why = &report.stages[Stage::Render as usize].why;
+    assert!(why.starts_with(reasons::RESUMED), "{report:?}");
 }
 
 fn states(events: &[Event]) -> Vec<OwnState> {
@@ -60,11 +67,11 @@ fn states(events: &[Event]) -> Vec<OwnState> {
 }
 
 #[test]
-fn keys_leave_the_image_and_its_report_alone() {
-    let mut keys = Keys::new();
+fn keys_do_not_change_the_image_or_report() {
+    let mut keys = ToggledBench::new();
     keys.0.overrides.report = Some(keys.0.path("r.json"));
     keys.0.done();
-    let files = |keys: &Keys| (keys.0.picture(), fs::read(keys.0.path("r.json")).expect("a report"));
+    let files = |keys: &ToggledBench| (keys.0.picture(), fs::read(keys.0.path("r.json")).expect("a report"));
     let before = files(&keys);
     let changes: [fn(&mut Overrides); 5] = [
         no_shadows,
@@ -79,13 +86,13 @@ fn keys_leave_the_image_and_its_report_alone() {
         assert!(!events.iter().any(|event| matches!(event, Event::Written { .. })));
         assert!(files(&keys) == before);
     }
-    // Nothing has to be rendered or written again.
+    // Nothing needs to be rendered or written again.
     assert_statuses(&keys.0.done().0, "rrrrrsrr");
 }
 
 #[test]
-fn a_key_writes_what_is_shown_and_the_own_image_comes_back() {
-    let mut keys = Keys::new();
+fn write_key_saves_the_shown_image() {
+    let mut keys = ToggledBench::new();
     let report = keys.0.path("r.json");
     keys.0.overrides.report = Some(report.clone());
     keys.0.done();
@@ -107,8 +114,8 @@ fn a_key_writes_what_is_shown_and_the_own_image_comes_back() {
 }
 
 #[test]
-fn a_save_while_keys_show_something_else_leaves_the_old_image() {
-    let mut keys = Keys::new();
+fn edit_during_toggles_keeps_the_old_image() {
+    let mut keys = ToggledBench::new();
     keys.0.done();
     let old = keys.0.picture();
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
@@ -117,7 +124,7 @@ fn a_save_while_keys_show_something_else_leaves_the_old_image() {
     // A comment changes nothing.
     keys.0.edit("intensity = [5, 5, 5]", "intensity = [10, 10, 10] # as before");
     assert_eq!(states(&keys.shown(no_shadows)), [OwnState::Written; 2]);
-    // Saved as it is shown: this is the own image.
+    // Save the shown settings, which makes this the own image.
     keys.0.edit("samples = 4", "samples = 4\nshadows = \"off\"");
     let events = keys.shown(no_shadows);
     assert_eq!(states(&events).last(), Some(&OwnState::Written));
@@ -125,8 +132,8 @@ fn a_save_while_keys_show_something_else_leaves_the_old_image() {
 }
 
 #[test]
-fn a_broken_scene_does_not_let_keys_write() {
-    let mut keys = Keys::new();
+fn broken_scene_does_not_let_keys_write() {
+    let mut keys = ToggledBench::new();
     keys.0.done();
     let own = keys.0.picture();
     keys.shown(no_shadows);
@@ -136,7 +143,7 @@ fn a_broken_scene_does_not_let_keys_write() {
     assert!(keys.0.picture() == own);
 }
 
-/// Renders pixels one after another, so slowly that a request can be sent meanwhile.
+/// Renders later samples slowly, so that a request can be sent meanwhile.
 fn slow(
     photons: Option<&crate::integrators::PhotonMaps>,
     world: &crate::world::World,
@@ -151,70 +158,70 @@ fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Requests the own image and waits until every pixel has a sample.
-fn begin(keys: &mut Keys) -> u64 {
+/// Requests the own image and waits until every pixel has two samples.
+fn begin(keys: &mut ToggledBench) -> u64 {
     keys.0.overrides.samples = Some(64);
     let of = keys.0.send();
     loop {
         match keys.0.next() {
             Event::Progress { progress, .. } if progress.samples >= 2 => return of,
-            Event::Done { .. } => panic!("it ended too early"),
+            Event::Done { .. } => panic!("the render ended too early"),
             _ => {}
         }
     }
 }
 
 #[test]
-fn the_own_render_goes_on_where_keys_interrupted_it() {
+fn interrupted_own_render_continues() {
     let whole = {
-        let mut keys = Keys::new();
+        let mut keys = ToggledBench::new();
         keys.0.overrides.samples = Some(64);
         keys.0.done();
         keys.0.picture()
     };
-    let mut keys = Keys::with(slow);
+    let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(no_shadows);
     assert_eq!(states(&events), [OwnState::Begun { is_rendering: false }; 2]);
     assert!(!keys.0.path("out.ppm").exists());
     let (report, _) = keys.0.done();
-    assert!(report.stages[Stage::Render as usize].why.starts_with("went on after"), "{report:?}");
+    assert_resumed(&report);
     assert!(keys.0.picture() == whole);
 }
 
 #[test]
-fn another_exposure_of_the_own_film_does_not_keep_it_from_its_file() {
-    let mut keys = Keys::with(slow);
+fn changed_exposure_still_writes_the_own_image() {
+    let mut keys = ToggledBench::with(slow);
     begin(&mut keys);
     let events = keys.shown(|overrides| overrides.exposure = Some(2.0));
     assert_eq!(states(&events), [OwnState::Begun { is_rendering: true }, OwnState::Written]);
     let picture = keys.0.picture();
     let (report, _) = keys.0.done();
     assert_statuses(&report, "rrrrrsrr");
-    assert!(keys.0.picture() == picture, "it had the scene's own exposure");
+    assert!(keys.0.picture() == picture, "written with the scene's exposure");
 }
 
 #[test]
-fn the_checkpoint_of_the_own_render_is_kept_when_keys_show_something_else_at_the_end() {
+fn own_render_is_saved_while_toggled() {
     let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
     for (end, is_kept) in [(Command::Suspend, true), (Command::Quit, false)] {
-        let mut keys = Keys::with(slow);
+        let mut keys = ToggledBench::with(slow);
         keys.0.overrides.checkpoints = checkpoints;
         begin(&mut keys);
         keys.shown(no_shadows);
         let path = keys.0.path("out.ppm.checkpoint");
         keys.0.worker.send(end);
         assert!(keys.0.worker.end_within(Duration::from_secs(60)));
-        assert_eq!(path.exists(), is_kept, "a render of less than a minute is kept after a signal only");
+        assert_eq!(path.exists(), is_kept, "a short render is saved only after a signal");
         if is_kept {
-            keys.0.worker = crate::worker::start_with(Means::default()).expect("a thread");
+            keys.0.worker = crate::worker::start_with(EngineConfig::default()).expect("a thread");
             let (report, _) = keys.0.done();
-            assert!(report.stages[Stage::Render as usize].why.starts_with("went on after"), "{report:?}");
+            assert_resumed(&report);
             assert!(!path.exists(), "its image is written");
         }
     }
-    // After a save, the render of before is of no use.
-    let mut keys = Keys::with(slow);
+    // After an edit, the earlier render is useless.
+    let mut keys = ToggledBench::with(slow);
     keys.0.overrides.checkpoints = checkpoints;
     begin(&mut keys);
     keys.0.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
@@ -225,15 +232,15 @@ fn the_checkpoint_of_the_own_render_is_kept_when_keys_show_something_else_at_the
 }
 
 #[test]
-fn an_unfinished_image_leaves_no_older_report() {
-    let mut keys = Keys::with(slow);
+fn unfinished_image_removes_an_older_report() {
+    let mut keys = ToggledBench::with(slow);
     let report = keys.0.path("r.json");
     keys.0.overrides.report = Some(report.clone());
     keys.0.done();
     assert!(report.exists());
     keys.0.edit("samples = 4", "samples = 200");
     let narrow = |overrides: &mut Overrides| overrides.camera.fov = Some(30.0);
-    let begins = |of: u64, keys: &Keys| {
+    let begins = |of: u64, keys: &ToggledBench| {
         let is_begun = |event: &Event| matches!(event, Event::Progress { generation, progress } if *generation == of && progress.samples >= 2);
         while !is_begun(&keys.0.next()) {}
     };
@@ -241,10 +248,10 @@ fn an_unfinished_image_leaves_no_older_report() {
     begins(of, &keys);
     keys.0.worker.send(Command::Write);
     while !matches!(keys.0.next(), Event::Written { is_own: false, .. }) {}
-    // The next request begins after the file and its report.
+    // The next request begins after the image and its report.
     let events = keys.shown(no_shadows);
     assert!(!report.exists(), "{events:?}");
-    // A file that is no report of glimt stays.
+    // Keep a file that is not a report.
     fs::write(&report, "{}").expect("written");
     let of = keys.show(narrow);
     begins(of, &keys);
@@ -254,7 +261,7 @@ fn an_unfinished_image_leaves_no_older_report() {
 }
 
 #[test]
-fn the_last_good_image_leaves_no_older_report() {
+fn last_good_image_removes_an_older_report() {
     let mut bench = Bench::with(SCENE, slow);
     bench.writing = Writing::Try;
     let report = bench.path("r.json");
@@ -264,7 +271,7 @@ fn the_last_good_image_leaves_no_older_report() {
     bench.edit("samples = 4", "samples = 8");
     bench.edit("intensity = [10, 10, 10]", "intensity = [5, 5, 5]");
     let of = bench.send();
-    // Its files are read; then the scene breaks.
+    // Break the scene after its files have been read.
     while !matches!(bench.next(), Event::Progress { generation, .. } if generation == of) {}
     bench.edit("[camera]", "[camera");
     bench.send();
@@ -272,8 +279,8 @@ fn the_last_good_image_leaves_no_older_report() {
     assert!(bench.picture() != earlier && !report.exists());
 }
 
-/// Bytes that a render of the scene needs with these overrides.
-fn needed(keys: &Keys, overrides: &Overrides) -> u64 {
+/// Returns the bytes that a render of the scene needs with these overrides.
+fn memory_needed(keys: &ToggledBench, overrides: &Overrides) -> u64 {
     crate::check::memory_needed(&keys.0.path("scene.toml"), overrides).expect("a scene")
 }
 
@@ -281,12 +288,12 @@ fn needed(keys: &Keys, overrides: &Overrides) -> u64 {
 fn memory_counts_the_unfinished_own_film() {
     let film = 40 * 30 * 40;
     for (more, fits) in [(film / 2, false), (2 * film, true)] {
-        let mut keys = Keys::with(slow);
+        let mut keys = ToggledBench::with(slow);
         keys.0.overrides.samples = Some(64);
-        keys.0.overrides.memory = Some(needed(&keys, &keys.0.overrides) + more);
+        keys.0.overrides.memory = Some(memory_needed(&keys, &keys.0.overrides) + more);
         begin(&mut keys);
-        // The same film in another way takes no more memory.
-        let stops = |keys: &mut Keys, change: fn(&mut Overrides)| {
+        // Another view of the same film needs no more memory.
+        let stops = |keys: &mut ToggledBench, change: fn(&mut Overrides)| {
             let of = keys.show(change);
             let begins =
                 |event: &Event| matches!(event, Event::Progress { generation, .. } if *generation == of);
@@ -301,18 +308,18 @@ fn memory_counts_the_unfinished_own_film() {
         assert!(stops(&mut keys, |overrides| overrides.exposure = Some(1.0)).is_none());
         let failure = stops(&mut keys, no_shadows);
         assert_eq!(matches!(failure, Some(Failure::Work(_))), !fits, "{failure:?}");
-        // Back at the scene's own settings, its render continues.
+        // Its render continues after a return to the scene's own settings.
         let (report, _) = keys.0.done();
-        assert!(report.stages[Stage::Render as usize].why.starts_with("went on after"), "{report:?}");
+        assert_resumed(&report);
     }
 }
 
 #[test]
-fn a_written_own_film_makes_room() {
+fn written_own_film_makes_room() {
     let film = 40 * 30 * 40;
     for (more, stays) in [(film / 2, false), (2 * film, true)] {
-        let mut keys = Keys::new();
-        keys.0.overrides.memory = Some(needed(&keys, &keys.0.overrides) + more);
+        let mut keys = ToggledBench::new();
+        keys.0.overrides.memory = Some(memory_needed(&keys, &keys.0.overrides) + more);
         keys.0.done();
         let own = keys.0.picture();
         assert_eq!(states(&keys.shown(no_shadows)), [OwnState::Written; 2]);

@@ -1,4 +1,4 @@
-//! Tests of photons in the worker: which are kept, and which orders are heard while photons are sent.
+//! Tests of photons in the worker: cached maps, and orders while photons are traced.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,13 +9,13 @@ use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::world::World;
 
-/// All light comes through the glass around the lamp; so many photons in a pass.
+/// Returns a scene whose light is enclosed in glass, with `count` photons per pass.
 fn wrapped(count: u32) -> String {
     let glass = "[[sphere]]\ncenter = [0, 3, 0]\nradius = 0.1\nmaterial = \"clear\"\n[[plane]]\nmaterial = \"wall\"\n[materials.clear]\ntype = \"glass\"\n";
     format!("{SCENE}{glass}[photons]\nenabled = true\ncount = {count}\n")
 }
 
-/// Waits until the stage of the first photons is at work.
+/// Waits until the photons stage runs.
 fn until_first_are_sent(bench: &Bench) {
     let is_it = |event: &Event| match event {
         Event::Stage { stage, .. } => stage.name == Stage::Photons && stage.status == Status::Running,
@@ -25,29 +25,29 @@ fn until_first_are_sent(bench: &Bench) {
 }
 
 #[test]
-fn orders_are_heard_while_the_first_photons_are_sent() {
+fn orders_are_handled_during_first_photons() {
     let mut bench = Bench::new(&wrapped(1_500_000));
     let of = bench.send();
     until_first_are_sent(&bench);
-    // Held, the photons arrive nowhere: nobody waits for their end.
+    // The pause keeps the stage from ending before the orders arrive.
     bench.worker.send(Command::Pause(true));
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
-    bench.worker.send(Command::Pick(Spot { x: 0.5, y: 0.5 }));
+    bench.worker.send(Command::Pick(ImagePosition { x: 0.5, y: 0.5 }));
     while !matches!(bench.next(), Event::Picked { picked, .. } if picked.thing.is_some()) {}
     bench.worker.send(Command::Pause(false));
     let events = bench.until_end(of);
-    assert!(!events.iter().any(|event| matches!(event, Event::WritePostponed { .. })), "it is said once");
+    assert!(!events.iter().any(|event| matches!(event, Event::WritePostponed { .. })), "reported once");
     assert!(events.iter().any(|event| matches!(event, Event::Written { .. })));
 }
 
 #[test]
-fn write_is_heard_while_the_photons_of_later_samples_are_sent() {
+fn write_is_handled_during_later_photons() {
     let text = wrapped(4_000_000).replace("samples = 4", "samples = 1000000");
     let mut bench = Bench::new(&text);
     let of = bench.send();
     while !matches!(bench.next(), Event::Progress { progress, .. } if progress.samples > 0) {}
-    // Nearly all time belongs to the photons under way, but not the moment in which progress is reported.
+    // Most of the time is spent on photons, but not the moment in which progress is reported.
     std::thread::sleep(Duration::from_millis(50));
     bench.worker.send(Command::Pause(true));
     std::thread::sleep(Duration::from_millis(100));
@@ -58,8 +58,8 @@ fn write_is_heard_while_the_photons_of_later_samples_are_sent() {
 }
 
 #[test]
-fn time_that_ends_while_photons_are_sent_ends_the_render() {
-    // A pass of photons takes longer than that, a sample of the picture does not.
+fn time_limit_ends_a_photon_pass() {
+    // A photon pass takes longer than the time limit, a sample of the image does not.
     let text = wrapped(2_000_000).replace("samples = 4", "samples = 1000000");
     let mut bench = Bench::new(&text);
     bench.overrides.time_seconds = Some(0.2);
@@ -70,7 +70,7 @@ fn time_that_ends_while_photons_are_sent_ends_the_render() {
 
 static WITHOUT: AtomicBool = AtomicBool::new(false);
 
-/// A kernel as the real one, which notes whether it renders without photons.
+/// Renders normally and records whether any call had no photons.
 fn without(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -83,7 +83,7 @@ fn without(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
-/// Whether each preview lacked the light of photons, and whether the photons were there when it came.
+/// Returns for each preview whether it lacked the photons' light and whether the photons had been traced before.
 fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
     let (of, mut previews, mut are_there) = (bench.send(), Vec::new(), false);
     loop {
@@ -102,14 +102,14 @@ fn previews_of(bench: &mut Bench) -> Vec<(bool, bool)> {
 }
 
 #[test]
-fn a_picture_without_photons_comes_before_them_and_one_with_them_takes_its_place() {
+fn preview_without_photons_precedes_them() {
     let mut bench = Bench::with(&wrapped(300_000), without);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let previews = previews_of(&mut bench);
     assert_eq!(previews.first(), Some(&(true, false)), "{previews:?}");
     assert!(WITHOUT.load(Ordering::SeqCst));
     assert!(previews.len() > 1 && previews[1..].iter().all(|it| *it == (false, true)), "{previews:?}");
-    // A camera that moves finds the photons that are kept, and they are in its first picture.
+    // A moving camera reuses the cached photons in its first image.
     WITHOUT.store(false, Ordering::SeqCst);
     bench.overrides.camera.fov = Some(50.0);
     let previews = previews_of(&mut bench);
@@ -118,7 +118,7 @@ fn a_picture_without_photons_comes_before_them_and_one_with_them_takes_its_place
 }
 
 #[test]
-fn the_picture_without_photons_leaves_no_trace_in_the_film() {
+fn preview_without_photons_does_not_affect_film() {
     let mut pictures = [None, Some(PreviewSize { width: 12, height: 12, around: None })].map(|preview| {
         let mut bench = Bench::new(&wrapped(1000));
         bench.preview = preview;
@@ -136,15 +136,15 @@ fn maps_are_kept_while_there_is_room() {
     let report = bench.done().0.photons.expect("they are on");
     assert_eq!(report.passes, 8);
     let of_pass = report.used_memory_bytes;
-    assert!(8 * of_pass > MOST, "{of_pass} bytes a pass: all have room");
+    assert!(8 * of_pass > MOST, "{of_pass} bytes per pass: all fit");
     let kept = report.kept_memory_bytes;
-    assert!(kept <= MOST && kept + of_pass > MOST, "{kept} bytes kept of passes of {of_pass}");
+    assert!(kept <= MOST && kept + of_pass > MOST, "{kept} bytes kept, {of_pass} per pass");
 }
 
-/// Whether the kernel below was given photons.
+/// Whether the kernel below received photons.
 static WITH: AtomicBool = AtomicBool::new(false);
 
-/// A kernel that renders every sample black, with photons or without.
+/// Renders every sample black, with or without photons.
 fn black(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -160,7 +160,7 @@ fn black(
 }
 
 #[test]
-fn a_kernel_renders_every_tile_also_where_photons_are_gathered() {
+fn kernel_is_used_with_photons() {
     let mut bench = Bench::with(&wrapped(1000), black);
     bench.done();
     let picture = std::fs::read(bench.path("out.ppm")).expect("a picture");
@@ -169,7 +169,7 @@ fn a_kernel_renders_every_tile_also_where_photons_are_gathered() {
 }
 
 #[test]
-fn a_scene_without_photons_has_one_reason_for_that() {
+fn reason_for_no_photons_is_stable() {
     let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\n"));
     let mut reason = |integrator| {
         bench.overrides.integrator = integrator;
@@ -178,7 +178,7 @@ fn a_scene_without_photons_has_one_reason_for_that() {
         (stage.status, stage.why.clone())
     };
     let first = reason(None);
-    assert_eq!(first, (Status::Skipped, "no mirror or glass throws light".to_owned()));
+    assert_eq!(first, (Status::Skipped, reasons::NO_SPECULAR_SURFACES.to_owned()));
     assert_ne!(reason(Some(crate::scene::description::Integrator::Path)), first);
     assert_eq!(reason(None), first);
 }

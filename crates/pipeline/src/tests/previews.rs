@@ -1,11 +1,11 @@
-//! Pictures for the screen: their size, their part, what they are stretched to.
+//! Tests of previews: size, section and range.
 
 use super::orders::slow;
 use super::*;
 use crate::settings::View;
 
 #[test]
-fn previews_fit_their_bounds_and_a_new_size_renders_nothing() {
+fn preview_size_change_renders_nothing() {
     let mut bench = Bench::new(SCENE);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let generation = bench.send();
@@ -19,7 +19,7 @@ fn previews_fit_their_bounds_and_a_new_size_renders_nothing() {
 }
 
 #[test]
-fn a_close_up_has_the_picture_s_own_pixels() {
+fn close_up_shows_image_pixels() {
     let mut bench = Bench::new(SCENE);
     bench.preview = Some(PreviewSize { width: 40, height: 30, around: None });
     bench.done();
@@ -28,7 +28,7 @@ fn a_close_up_has_the_picture_s_own_pixels() {
     let whole = latest(&bench);
     assert_eq!((whole.picture.width, whole.section), (40, None));
     for (spot, left, top) in [((0.5, 0.5), 14, 11), ((0.0, 1.0), 0, 22), ((2.0, -1.0), 28, 0)] {
-        let around = Some(Spot { x: spot.0, y: spot.1 });
+        let around = Some(ImagePosition { x: spot.0, y: spot.1 });
         bench.preview = Some(PreviewSize { width: 12, height: 8, around });
         assert_statuses(&bench.done().0, "rrrrrsrr");
         let LatestPreview { picture, section, .. } = latest(&bench);
@@ -40,13 +40,14 @@ fn a_close_up_has_the_picture_s_own_pixels() {
             assert_eq!(*pixel, whole.picture.pixels[at as usize], "pixel {i} around {spot:?}");
         }
     }
-    bench.preview = Some(PreviewSize { width: 200, height: 200, around: Some(Spot { x: 0.3, y: 0.3 }) });
+    bench.preview =
+        Some(PreviewSize { width: 200, height: 200, around: Some(ImagePosition { x: 0.3, y: 0.3 }) });
     bench.done();
-    assert_eq!(latest(&bench).picture, whole.picture, "a small picture is there whole, in its own size");
+    assert_eq!(latest(&bench).picture, whole.picture, "a small image is shown whole at its own size");
 }
 
 #[test]
-fn previews_say_which_image_they_show_and_whether_it_is_finished() {
+fn previews_identify_their_image() {
     let mut bench = Bench::new(SCENE);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let source = |bench: &mut Bench| {
@@ -57,10 +58,10 @@ fn previews_say_which_image_they_show_and_whether_it_is_finished() {
         source.image
     };
     let own = source(&mut bench);
-    // Neither its size nor a comment nor a render from the beginning makes it another one.
+    // Neither another size nor a comment nor a fresh render makes it another image.
     bench.preview = Some(PreviewSize { width: 20, height: 30, around: None });
     assert!(source(&mut bench) == own);
-    bench.edit("[camera]", "# the eye\n[camera]");
+    bench.edit("[camera]", "# a comment\n[camera]");
     assert!(source(&mut bench) == own);
     bench.force = true;
     assert!(source(&mut bench) == own);
@@ -80,7 +81,7 @@ fn previews_say_which_image_they_show_and_whether_it_is_finished() {
 }
 
 #[test]
-fn under_a_budget_of_time_each_render_is_an_image_of_its_own() {
+fn time_limited_renders_are_separate_images() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     bench.overrides.time_seconds = Some(0.2);
@@ -88,7 +89,7 @@ fn under_a_budget_of_time_each_render_is_an_image_of_its_own() {
     for force in [false, false, true] {
         bench.force = force;
         bench.done();
-        // What is shown during the render is not known to be the end.
+        // Request a preview after the end, because earlier ones are not known to be final.
         bench.worker.send(Command::Preview(bench.preview));
         while !matches!(bench.next(), Event::Preview { .. }) {}
         let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
@@ -100,7 +101,7 @@ fn under_a_budget_of_time_each_render_is_an_image_of_its_own() {
 }
 
 #[test]
-fn another_size_of_the_preview_interrupts_nothing() {
+fn preview_size_change_does_not_interrupt() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
     let of = bench.send();
@@ -129,10 +130,10 @@ fn another_size_of_the_preview_interrupts_nothing() {
 }
 
 #[test]
-fn distances_are_stretched_in_the_preview_as_in_the_picture() {
+fn preview_and_image_share_the_depth_range() {
     let mut bench = Bench::new(SCENE);
     bench.overrides.view = Some(View::Depth);
-    for (width, around) in [(7, None), (40, None), (6, Some(Spot { x: 0.5, y: 0.5 }))] {
+    for (width, around) in [(7, None), (40, None), (6, Some(ImagePosition { x: 0.5, y: 0.5 }))] {
         bench.preview = Some(PreviewSize { width, height: 30, around });
         let (report, _) = bench.done();
         let shown = bench.worker.previews.lock().expect("whole").take().expect("a picture");

@@ -1,11 +1,11 @@
-//! Tests of reuse: the stages that each edit runs again, and the events about files.
+//! Tests of reuse: which stages run again after an edit, and which files are reported.
 
 use super::*;
 use crate::integrators::View;
 use crate::scene::description::{Accel, Shadows};
 
 #[test]
-fn each_edit_redoes_only_what_reads_it() {
+fn edits_rerun_only_dependent_stages() {
     let mut bench = Bench::new(SCENE);
     assert_statuses(&bench.done().0, "dddddsdd");
 
@@ -37,12 +37,12 @@ fn each_edit_redoes_only_what_reads_it() {
     bench.edit("translate = [0, 0, 0]", "translate = [1, 0, 0]");
     let report = bench.done().0;
     assert_statuses(&report, "drrdrsdd");
-    assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is kept");
+    assert!(report.stages[Stage::Accel as usize].why.contains("1 kept"), "the mesh's tree is reused");
 
     bench.edit("exposure = 1.0", "exposure = 1.0\naccel = \"kdtree\"");
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "drrdrsrr");
-    assert!(unchanged, "every kind of tree gives the same picture");
+    assert!(unchanged, "every kind of tree gives the same image");
     assert_eq!(report.counters.camera_rays, 0);
     assert!(!report.stages[Stage::Accel as usize].why.contains("kept"), "a tree of another kind");
     assert_eq!(report.settings.accel, Accel::KdTree);
@@ -57,7 +57,7 @@ fn each_edit_redoes_only_what_reads_it() {
 }
 
 #[test]
-fn opacity_and_vertex_colours_redo_only_what_reads_them() {
+fn opacity_and_vertex_colors_rerun_few_stages() {
     let mut bench = Bench::new(SCENE);
     assert_statuses(&bench.done().0, "dddddsdd");
     let mut expect = |from: &str, to: &str, statuses: &str| {
@@ -68,14 +68,14 @@ fn opacity_and_vertex_colours_redo_only_what_reads_them() {
     };
     expect("diffuse = [0.5, 0.5, 0.5]", "diffuse = [0.5, 0.5, 0.5]\nopacity = 0.5", "drrrrsdd");
     expect("translate = [0, 0, 0]", "translate = [0, 0, 0]\nvertex_colors = true", "drrrrsdd");
-    // What emits is a light, which its opacity weakens.
+    // An emissive surface is a light, whose power depends on its opacity.
     expect("opacity = 0.5", "opacity = 0.5\nemission = [1, 1, 1]", "drrrdsdd");
     expect("opacity = 0.5", "opacity = 0.25", "drrrdsdd");
     expect("emission = [1, 1, 1]", "emission = [1, 1, 1]\nemission_sides = \"both\"", "drrrdsdd");
 }
 
 #[test]
-fn heights_redo_the_picture_alone() {
+fn bump_maps_rerun_only_the_render() {
     let mut bench = Bench::new(&format!("{SCENE}[textures.bumps]\nfile = \"bumps.ppm\"\n"));
     bench.write("bumps.ppm", "P6\n2 1\n255\nabcxyz");
     assert_statuses(&bench.done().0, "dddddsdd");
@@ -93,7 +93,7 @@ fn heights_redo_the_picture_alone() {
 }
 
 #[test]
-fn files_that_a_mesh_names_are_part_of_it() {
+fn files_referenced_by_a_mesh_belong_to_it() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
     bench.write("one.obj", &format!("mtllib one.mtl\n{OBJ}"));
@@ -104,7 +104,7 @@ fn files_that_a_mesh_names_are_part_of_it() {
     assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Done);
 }
 
-/// A file of every kind that a scene reads: each is replaced between the moments at which it is hashed and decoded.
+/// A file of each kind that a scene reads, which is replaced between hashing and decoding.
 const KINDS: [(&str, &str, &str); 8] = [
     ("scene.toml", KINDS_SCENE, "#"),
     (
@@ -173,7 +173,7 @@ const KINDS_GLTF: &str = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "a
     "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}]}"#;
 
 #[test]
-fn an_image_never_shows_bytes_that_were_not_hashed() {
+fn image_never_shows_unhashed_bytes() {
     let new_bench = || {
         let bench = Bench::new(KINDS_SCENE);
         bench.write("a.gltf", KINDS_GLTF);
@@ -190,8 +190,8 @@ fn an_image_never_shows_bytes_that_were_not_hashed() {
         let mut fresh = new_bench();
         fresh.write(name, &new);
         let new_image = image(&mut fresh);
-        assert!(new_image != old_image, "{name} is seen");
-        // Without caches, then with caches of the old content, which is hashed again.
+        assert!(new_image != old_image, "{name} affects the image");
+        // First without caches, then with caches of the old content.
         for is_cold in [true, false] {
             let mut bench = new_bench();
             if !is_cold {
@@ -203,7 +203,7 @@ fn an_image_never_shows_bytes_that_were_not_hashed() {
             replacements().insert(bench.path(name), new.clone().into());
             let shown = image(&mut bench);
             assert!(shown == new_image || shown == old_image, "{name}, {is_cold}: one version or the other");
-            // A file that is hashed only when it is decoded has not been replaced.
+            // A file that is hashed only when decoded has not been replaced yet.
             replacements().clear();
             bench.write(name, &new);
             assert!(image(&mut bench) == new_image, "{name}, {is_cold}: the content on disk");
@@ -214,7 +214,7 @@ fn an_image_never_shows_bytes_that_were_not_hashed() {
 }
 
 #[test]
-fn a_file_is_hashed_once_by_a_request_whatever_asks_for_it() {
+fn each_file_is_hashed_once_per_request() {
     let textures = "[textures.skin]\nfile = \"skin.ppm\"\n";
     let twice = format!("{textures}[textures.bumps]\nfile = \"skin.ppm\"\nencoding = \"linear\"\n");
     let scene = SCENE.replace(textures, &twice).replace("\"skin\" }", "\"skin\" }\nnormal_map = \"bumps\"");
@@ -226,7 +226,7 @@ fn a_file_is_hashed_once_by_a_request_whatever_asks_for_it() {
         let mut hashed = std::mem::take(&mut *bench.worker.contents().hashed.lock().expect("not poisoned"));
         hashed.sort();
         let names = ["one.mtl", "one.obj", "out.ppm", "scene.toml", "skin.ppm"];
-        // Nobody knows of the material file before the mesh is read, which hashes what it decodes.
+        // The first round learns of the material file only from the mesh, and hashes it while decoding.
         let names = &names[1 - round..];
         let names: Vec<_> = names.iter().map(|name| bench.path(name)).collect();
         assert_eq!(hashed, names, "round {round}");
@@ -234,7 +234,7 @@ fn a_file_is_hashed_once_by_a_request_whatever_asks_for_it() {
 }
 
 #[test]
-fn a_toggle_that_is_switched_back_finds_its_film_again() {
+fn toggling_back_reuses_the_film() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let soft = bench.picture();
@@ -247,22 +247,18 @@ fn a_toggle_that_is_switched_back_finds_its_film_again() {
     bench.writing = Writing::No;
     let (report, unchanged) = bench.done();
     assert_statuses(&report, "rrrrrsrs");
-    assert!(!unchanged, "another picture is shown than before");
+    assert!(!unchanged, "the shown image differs");
     bench.writing = Writing::Must;
     let (report, _) = bench.done();
     assert_statuses(&report, "rrrrrsrd");
     assert_eq!(report.counters.camera_rays, 0);
     assert_eq!(bench.picture(), soft);
     bench.force = true;
-    assert_eq!(
-        bench.done().0.stages[Stage::Render as usize].status,
-        Status::Done,
-        "unless asked to begin anew"
-    );
+    assert_eq!(bench.done().0.stages[Stage::Render as usize].status, Status::Done, "forced");
 }
 
 #[test]
-fn a_picture_that_was_deleted_is_written_again() {
+fn deleted_image_is_written_again() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     fs::remove_file(bench.path("out.ppm")).expect("removed");
@@ -271,21 +267,21 @@ fn a_picture_that_was_deleted_is_written_again() {
 }
 
 #[test]
-fn a_scene_without_files_says_why_stages_are_skipped() {
+fn skipped_stages_have_reasons() {
     let text = SCENE.replace("{ texture = \"skin\" }", "[1, 1, 1]");
     let text = text.replace("[textures.skin]\nfile = \"skin.ppm\"\n", "");
     let text = text.replace("[[mesh]]\nfile = \"one.obj\"\nmaterial = \"wall\"\ntranslate = [0, 0, 0]\n", "");
     let report = Bench::new(&text).done().0;
     assert_statuses(&report, "dssddsdd");
     let why = |stage: Stage| report.stages[stage as usize].why.clone();
-    assert_eq!(why(Stage::Meshes), "the scene has no mesh");
-    assert_eq!(why(Stage::Textures), "nothing that is seen names a texture");
-    assert_eq!(why(Stage::Photons), "the scene does not enable photons");
+    assert_eq!(why(Stage::Meshes), reasons::NO_MESHES);
+    assert_eq!(why(Stage::Textures), reasons::NO_TEXTURES);
+    assert_eq!(why(Stage::Photons), reasons::PHOTONS_OFF);
 }
 
 #[test]
-fn photons_are_sent_again_only_where_what_they_meet_changed() {
-    // The ambient light that replaces the photons shows that they are off.
+fn photons_are_retraced_only_if_affected() {
+    // The ambient light is visible only while photons are off.
     let text = SCENE.replace("exposure = 0.0", "exposure = 0.0\nambient = 0.3");
     let mirror = "[[quad]]\ncorner = [-2, 0, -2]\nu = [4, 0, 0]\nv = [0, 4, 0]\nmaterial = \"steel\"\n";
     let steel = "[materials.steel]\ntype = \"mirror\"\n";
@@ -295,7 +291,7 @@ fn photons_are_sent_again_only_where_what_they_meet_changed() {
     let report = bench.done().0;
     assert_statuses(&report, "dddddddd");
     assert!(report.settings.photons);
-    assert_eq!((of(&report).passes, of(&report).emitted), (4, 2000), "one for each sample");
+    assert_eq!((of(&report).passes, of(&report).emitted), (4, 2000), "one pass per sample");
     assert_eq!((report.counters.photons_emitted, report.counters.photons_stored), (2000, of(&report).stored));
 
     for (from, to, expected) in [
@@ -320,11 +316,11 @@ fn photons_are_sent_again_only_where_what_they_meet_changed() {
     assert!(report.photons.is_none() && bench.picture() != on);
     bench.overrides.photons = None;
     assert_statuses(&bench.done().0, "rrrrrrrd");
-    assert_eq!(bench.picture(), on, "its film was kept");
+    assert_eq!(bench.picture(), on, "the cached film");
 }
 
 #[test]
-fn photons_are_skipped_where_nothing_throws_them() {
+fn photons_are_skipped_without_mirrors() {
     let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\n"));
     for (expected, next) in [("dddddsdd", "[0, 1.5, 4]"), ("drrrrsdd", "[0, 1, 4]")] {
         let report = bench.done().0;
@@ -336,8 +332,8 @@ fn photons_are_skipped_where_nothing_throws_them() {
 }
 
 #[test]
-fn photons_that_are_sent_later_are_those_of_a_fresh_render() {
-    // `ambient` is ignored with photons: neither what is stored nor the film may depend on it.
+fn later_photons_match_a_fresh_render() {
+    // `ambient` is ignored with photons, so neither the stored photons nor the film may depend on it.
     let ambient =
         |value: &str| SCENE.replace("exposure = 0.0", &format!("exposure = 0.0\nambient = {value}"));
     let glass = "[[sphere]]\ncenter = [0.7, 1, 1]\nradius = 0.4\nmaterial = \"clear\"\n[materials.clear]\ntype = \"glass\"\n";
@@ -354,7 +350,7 @@ fn photons_that_are_sent_later_are_those_of_a_fresh_render() {
 }
 
 #[test]
-fn all_assets_that_cannot_be_used_are_said_and_watched_and_mending_them_helps() {
+fn all_broken_assets_are_reported_and_watched() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.obj", "");
     bench.write("skin.ppm", "");
@@ -366,7 +362,7 @@ fn all_assets_that_cannot_be_used_are_said_and_watched_and_mending_them_helps() 
     for name in ["one.obj", "skin.ppm"] {
         let error = errors.iter().find(|error| error.message.contains(name)).expect("an error that names it");
         let place = error.place.as_ref().expect("a place in the scene");
-        assert!(place.source[place.span.clone()].contains(name), "the place that names the file");
+        assert!(place.source[place.span.clone()].contains(name), "the place of the file name");
         assert_eq!(error.path, bench.path("scene.toml"));
     }
     let Some(Event::Files { files, .. }) = events.pop() else { panic!("no files") };
@@ -380,7 +376,7 @@ fn all_assets_that_cannot_be_used_are_said_and_watched_and_mending_them_helps() 
 }
 
 #[test]
-fn a_broken_scene_keeps_its_assets_watched_and_loaded() {
+fn broken_scene_keeps_its_assets() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let before = bench.picture();
@@ -393,16 +389,16 @@ fn a_broken_scene_keeps_its_assets_watched_and_loaded() {
         _ => None,
     });
     assert!(files.expect("files").iter().any(|file| file.path == bench.path("one.obj")));
-    assert_eq!(bench.picture(), before, "the picture stays");
+    assert_eq!(bench.picture(), before, "the image remains");
     bench.edit("width = = 40", "width = 40");
-    // A scene that was not understood is no value: it is parsed again, but nothing else is done.
+    // An invalid scene is not cached, so it is parsed again, but no other stage runs.
     let (report, unchanged) = bench.done();
     assert_eq!(report.stages[Stage::Meshes as usize].status, Status::Reused);
     assert!(unchanged);
 }
 
 #[test]
-fn a_missing_file_that_a_broken_scene_names_is_watched() {
+fn missing_file_of_a_broken_scene_is_watched() {
     let mut bench = Bench::new(&SCENE.replace("one.obj", "later.obj"));
     let of = bench.send();
     let files: Vec<PathBuf> = bench
@@ -435,7 +431,7 @@ fn progress_never_falls_and_ends_at_one() {
 }
 
 #[test]
-fn threads_do_not_change_the_picture() {
+fn thread_count_does_not_change_the_image() {
     let picture = |threads| {
         let mut bench = Bench::new(&SCENE.replace("samples = 4", "samples = 7"));
         bench.overrides.threads = Some(threads);
@@ -447,7 +443,7 @@ fn threads_do_not_change_the_picture() {
 }
 
 #[test]
-fn more_samples_go_on_from_those_that_are_there_to_the_same_picture() {
+fn added_samples_give_the_same_image() {
     let mut bench = Bench::new(SCENE);
     let rays = |samples: u64| 40 * 30 * samples;
     bench.done();
@@ -455,15 +451,15 @@ fn more_samples_go_on_from_those_that_are_there_to_the_same_picture() {
     let report = bench.done().0;
     assert_eq!(report.image.samples.min, 9);
     assert!(report.image.complete);
-    let went_on = bench.picture();
+    let continued = bench.picture();
     bench.force = true;
     let again = bench.done().0;
-    assert_eq!(bench.picture(), went_on);
+    assert_eq!(bench.picture(), continued);
     assert_eq!(again.counters.camera_rays - report.counters.camera_rays, rays(4));
 }
 
 #[test]
-fn an_environment_is_a_file_among_others_and_turning_it_reloads_nothing() {
+fn rotating_the_environment_reloads_nothing() {
     let around = "[environment]\nfile = \"sky.ppm\"\nrotate = 0\n";
     let mut bench = Bench::new(&format!("{SCENE}{around}"));
     let sky = "P6\n2 1\n255\nabcdef";
@@ -473,7 +469,7 @@ fn an_environment_is_a_file_among_others_and_turning_it_reloads_nothing() {
     assert_eq!(report.counters.texels_loaded, 3);
     assert_eq!(report.stages[Stage::Lights as usize].why, "2 lights");
     assert_statuses(&bench.done().0, "rrrrrsrr");
-    // No texel is read again, no tree built.
+    // No texel is read and no tree is built.
     for (old, new) in [("rotate = 0", "rotate = 90"), ("rotate = 90", "color = [1, 0.5, 1]")] {
         bench.edit(old, new);
         let report = bench.done().0;
@@ -485,7 +481,7 @@ fn an_environment_is_a_file_among_others_and_turning_it_reloads_nothing() {
     let report = bench.done().0;
     assert_statuses(&report, "rrdrdsdd");
     assert_eq!(report.counters.texels_loaded, 2);
-    // In place of it a colour: nothing of the map is left.
+    // Replacing the map by a color drops it.
     bench.edit("file = \"sky.ppm\"\n", "");
     assert_statuses(&bench.done().0, "drrrdsdd");
     bench.edit("[environment]\n", "# ");
@@ -493,9 +489,9 @@ fn an_environment_is_a_file_among_others_and_turning_it_reloads_nothing() {
 }
 
 #[test]
-fn a_black_map_and_texels_that_are_no_light_are_answered() {
+fn black_map_and_bad_texels_cause_warnings() {
     let around = "[environment]\nfile = \"sky.exr\"\n";
-    let said = |values: &[f32]| {
+    let messages = |values: &[f32]| {
         let mut bench = Bench::new(&format!("{SCENE}{around}"));
         let raw: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
         let kind = image::ExtendedColorType::Rgb32F;
@@ -504,19 +500,34 @@ fn a_black_map_and_texels_that_are_no_light_are_answered() {
         assert_eq!(report.counters.non_finite_samples, 0);
         warnings.into_iter().map(|one| one.message).collect::<Vec<_>>()
     };
-    assert_eq!(said(&[1.0; 6]), Vec::<String>::new());
-    let bad =
-        said(&[1.0, f32::NAN, 1.0, 0.5, 0.5, 0.5, -1.0, 1.0, 1.0, 1.0, 1.0, f32::INFINITY, 3e38, 0.0, 0.0]);
-    assert!(bad.len() == 1 && bad[0].contains("sky.exr: 4 pixels are negative, not finite"), "{bad:?}");
-    let black = said(&[0.0; 6]);
-    assert!(black.len() == 1 && black[0].contains("is black: none of its 2 × 1 pixels"), "{black:?}");
-    assert_eq!(said(&[f32::NAN; 3]).len(), 2);
+    assert_eq!(messages(&[1.0; 6]), Vec::<String>::new());
+    let bad = messages(&[
+        1.0,
+        f32::NAN,
+        1.0,
+        0.5,
+        0.5,
+        0.5,
+        -1.0,
+        1.0,
+        1.0,
+        1.0,
+        1.0,
+        f32::INFINITY,
+        3e38,
+        0.0,
+        0.0,
+    ]);
+    assert!(bad.len() == 1 && bad[0].contains("sky.exr: 4 "), "{bad:?}");
+    let black = messages(&[0.0; 6]);
+    assert!(black.len() == 1 && black[0].contains(" 2 × 1 "), "{black:?}");
+    assert_eq!(messages(&[f32::NAN; 3]).len(), 2);
 }
 
 #[test]
-fn a_map_that_is_no_picture_is_an_error_where_the_scene_names_it() {
+fn invalid_map_is_an_error_at_its_reference() {
     let mut bench = Bench::new(&format!("{SCENE}[environment]\nfile = \"sky.hdr\"\n"));
-    bench.write("sky.hdr", "no picture");
+    bench.write("sky.hdr", "not an image");
     let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
     assert_eq!(errors.len(), 1, "{errors:?}");
     let place = errors[0].place.as_ref().expect("a place");
@@ -525,7 +536,7 @@ fn a_map_that_is_no_picture_is_an_error_where_the_scene_names_it() {
 }
 
 #[test]
-fn levels_are_built_once_and_no_texel_is_read_for_them() {
+fn mipmaps_are_built_without_reading_files() {
     let mut bench = Bench::new(SCENE);
     bench.write("skin.ppm", "P6\n2 2\n255\nabcabcabcabc");
     let report = bench.done().0;
@@ -540,10 +551,10 @@ fn levels_are_built_once_and_no_texel_is_read_for_them() {
 }
 
 #[test]
-fn a_lamp_is_another_one_when_the_picture_on_it_is() {
-    let lamp = "[textures.slide]\nfile = \"slide.ppm\"\n[materials.lamp]\nemission = { texture = \"slide\", scale = 2 }\n\
-                [[sphere]]\ncenter = [0, 4, 0]\nradius = 0.5\nmaterial = \"lamp\"\n";
-    let mut bench = Bench::new(&format!("{SCENE}{lamp}"));
+fn emission_texture_changes_the_light() {
+    let light = "[textures.slide]\nfile = \"slide.ppm\"\n[materials.light]\nemission = { texture = \"slide\", scale = 2 }\n\
+                [[sphere]]\ncenter = [0, 4, 0]\nradius = 0.5\nmaterial = \"light\"\n";
+    let mut bench = Bench::new(&format!("{SCENE}{light}"));
     bench.write("slide.ppm", "P6\n1 1\n255\nabc");
     let report = bench.done().0;
     assert_eq!(report.stages[Stage::Lights as usize].why, "2 lights");
@@ -554,16 +565,16 @@ fn a_lamp_is_another_one_when_the_picture_on_it_is() {
     assert_ne!(bench.picture(), before);
     bench.edit("scale = 2", "scale = 3");
     assert_statuses(&bench.done().0, "drrrdsdd");
-    // One that is black is no lamp; nor is one that no factor is left of.
+    // A black emitter is not a light, nor is one with a factor of 0.
     bench.write("slide.ppm", "P6\n1 1\n255\n\0\0\0");
     assert_eq!(bench.done().0.stages[Stage::Lights as usize].why, "1 light");
     bench.edit("scale = 3", "scale = 0");
     let report = bench.done().0;
-    assert_eq!(report.counters.texture_memory_bytes, 3, "it is not looked up");
+    assert_eq!(report.counters.texture_memory_bytes, 3, "the texture is not needed");
 }
 
 #[test]
-fn numbers_about_the_samples_take_none_of_their_own() {
+fn sample_views_need_no_samples() {
     let mut bench = Bench::new(SCENE);
     bench.done();
     let beauty = bench.picture();
@@ -579,9 +590,9 @@ fn numbers_about_the_samples_take_none_of_their_own() {
     assert_eq!(bench.picture(), beauty);
 }
 
-/// A picture that was not copied along is waited for, and is shown when it comes.
+/// An image that is missing at first is watched, and shown once it exists.
 #[test]
-fn a_picture_of_a_model_that_comes_later_is_seen() {
+fn late_texture_of_a_model_is_shown() {
     let mut bench = Bench::new(SCENE);
     bench.scene = "one.obj";
     bench.write("one.mtl", "newmtl m\nKd 0.2 0.4 0.2\nmap_Kd later.ppm\n");
@@ -593,15 +604,15 @@ fn a_picture_of_a_model_that_comes_later_is_seen() {
         _ => false,
     };
     assert!(events.iter().any(is_watched));
-    let is_said = |warnings: &[Diagnostic]| warnings.iter().any(|one| one.message.contains("later.ppm"));
+    let has_warning = |warnings: &[Diagnostic]| warnings.iter().any(|one| one.message.contains("later.ppm"));
     let Some(Event::Done { warnings, .. }) = events.last() else { panic!("{:?}", events.last()) };
-    assert!(is_said(warnings), "{warnings:?}");
+    assert!(has_warning(warnings), "{warnings:?}");
     let without = bench.picture();
     bench.write("later.ppm", "P6\n1 1\n255\nabc");
-    assert!(!is_said(&bench.done_with_warnings().1));
+    assert!(!has_warning(&bench.done_with_warnings().1));
     let with = bench.picture();
     assert!(with != without);
     fs::remove_file(bench.path("later.ppm")).expect("removed");
-    assert!(is_said(&bench.done_with_warnings().1));
+    assert!(has_warning(&bench.done_with_warnings().1));
     assert!(bench.picture() == without);
 }

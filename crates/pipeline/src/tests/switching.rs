@@ -1,10 +1,10 @@
-//! A scene that is switched away and back, and one picture of several that is saved.
+//! Tests of switching between scenes, and of changing one texture of several.
 
 use super::*;
 use crate::settings::View;
 
 #[test]
-fn a_scene_that_is_switched_back_to_finds_its_trees_and_pictures() {
+fn previous_scene_reuses_trees_and_textures() {
     let mut bench = Bench::new(SCENE);
     bench.write("two.obj", &format!("{OBJ}f 1 3 2\n"));
     bench.write("bark.ppm", "P6\n1 1\n255\nxyz");
@@ -18,7 +18,7 @@ fn a_scene_that_is_switched_back_to_finds_its_trees_and_pictures() {
         bench.write("scene.toml", &own);
         let report = bench.done().0;
         assert_statuses(&report, "drrrrsrd");
-        assert_eq!(report.stages[Stage::Accel as usize].why, "its trees were kept", "round {round}");
+        assert_eq!(report.stages[Stage::Accel as usize].why, reasons::CACHED, "round {round}");
         assert_eq!(report.counters.texels_loaded, 0);
         assert_eq!(bench.picture(), before);
         bench.write("scene.toml", &other);
@@ -27,7 +27,7 @@ fn a_scene_that_is_switched_back_to_finds_its_trees_and_pictures() {
 }
 
 #[test]
-fn a_scene_that_broke_on_the_way_finds_its_trees_too() {
+fn previous_scene_is_reused_after_errors() {
     let mut bench = Bench::new(SCENE);
     bench.write("two.obj", &format!("{OBJ}f 1 3 2\n"));
     bench.done();
@@ -43,7 +43,7 @@ fn a_scene_that_broke_on_the_way_finds_its_trees_too() {
 }
 
 #[test]
-fn of_several_pictures_only_the_one_that_was_saved_is_read() {
+fn only_the_changed_texture_is_read() {
     let other = "[textures.bark]\nfile = \"bark.ppm\"\n[materials.trunk]\ndiffuse = { texture = \"bark\" }\n\
                  [[sphere]]\ncenter = [1, 1, 0]\nradius = 0.2\nmaterial = \"trunk\"\n";
     let mut bench = Bench::new(&format!("{SCENE}{other}"));
@@ -56,11 +56,11 @@ fn of_several_pictures_only_the_one_that_was_saved_is_read() {
         bench.write(name, text);
         let report = bench.done().0;
         assert_statuses(&report, "rrdrrsdd");
-        assert_eq!((report.counters.texels_loaded, &*report.stages[2].why), (texels, "1 loaded, 1 kept"));
+        assert_eq!((report.counters.texels_loaded, &*report.stages[2].why), (texels, "1 loaded, 1 cached"));
     }
 }
 
-/// A lamp with two texels of bumps, three of light and four of a highlight; the ball has one.
+/// A light with two texels of normals, three of emission and four of specular color. The ball has one texel.
 const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfile = \"glow.ppm\"\n\
     [textures.gloss]\nfile = \"gloss.ppm\"\n\
     [materials.lamp]\nspecular = { texture = \"gloss\" }\nemission = { texture = \"glow\" }\nnormal_map = \"bumps\"\n\
@@ -68,7 +68,7 @@ const BUMPY: &str = "[textures.bumps]\nfile = \"bumps.ppm\"\n[textures.glow]\nfi
 
 const AMBIENT: &str = "\nambient = [0.1, 0.1, 0.1]";
 
-/// A bench with the files of [`BUMPY`], and a view.
+/// Creates a bench with the files of [`BUMPY`] and a view.
 fn bumpy(scene: &str, view: View) -> Bench {
     let mut bench = Bench::new(scene);
     bench.write("bumps.ppm", "P6\n2 1\n255\n\x7f\x7f\x7f\x7f\x7f\x7f");
@@ -78,7 +78,7 @@ fn bumpy(scene: &str, view: View) -> Bench {
     bench
 }
 
-/// The textures stage and the texels loaded, for a view of a scene that is seen for the first time.
+/// Returns the status and reason of the textures stage and the number of texels loaded, for a new scene.
 fn textures_of(scene: &str, view: View) -> (char, String, u64) {
     let report = bumpy(scene, view).done().0;
     let stage = &report.stages[Stage::Textures as usize];
@@ -87,37 +87,37 @@ fn textures_of(scene: &str, view: View) -> (char, String, u64) {
 }
 
 #[test]
-fn a_view_loads_the_textures_that_it_shows() {
+fn view_loads_only_the_textures_it_needs() {
     let bumpy = &format!("{SCENE}{BUMPY}");
     let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
-    let said = |status, why: &str, texels| (status, why.to_owned(), texels);
-    let nothing = said('s', "the view shows no texture", 0);
-    // No photons are sent, and no ambient light is reflected.
+    let textures = |status, why: &str, texels| (status, why.to_owned(), texels);
+    let nothing = textures('s', reasons::NOT_NEEDED_FOR_VIEW, 0);
+    // There are no photons and no ambient light in these scenes.
     for view in [View::Depth, View::Uv, View::Barycentric, View::Photons, View::Ambient] {
         assert_eq!(textures_of(bumpy, view), nothing, "{view:?}");
     }
     for view in [View::Normal, View::Shadow, View::Emission] {
         assert_eq!(textures_of(SCENE, view), nothing, "{view:?}");
     }
-    assert_eq!(textures_of(bumpy, View::Normal), said('d', "1 loaded, 3 not shown", 2));
-    assert_eq!(textures_of(bumpy, View::Albedo), said('d', "1 loaded, 3 not shown", 1));
-    // What lamps send is a part of what arrives, what surfaces reflect is not.
-    assert_eq!(textures_of(bumpy, View::Shadow), said('d', "2 loaded, 2 not shown", 5));
-    assert_eq!(textures_of(bumpy, View::Emission), said('d', "1 loaded, 3 not shown", 3));
-    assert_eq!(textures_of(&ambient(bumpy), View::Ambient), said('d', "1 loaded, 3 not shown", 1));
-    // The boxes are drawn over the picture, and the colour of a lobe says how often it is sampled.
+    assert_eq!(textures_of(bumpy, View::Normal), textures('d', "1 loaded, 3 not needed", 2));
+    assert_eq!(textures_of(bumpy, View::Albedo), textures('d', "1 loaded, 3 not needed", 1));
+    // The view `shadow` depends on emission, but not on reflectance.
+    assert_eq!(textures_of(bumpy, View::Shadow), textures('d', "2 loaded, 2 not needed", 5));
+    assert_eq!(textures_of(bumpy, View::Emission), textures('d', "1 loaded, 3 not needed", 3));
+    assert_eq!(textures_of(&ambient(bumpy), View::Ambient), textures('d', "1 loaded, 3 not needed", 1));
+    // Boxes are drawn over the image, and the color of a lobe affects how often it is sampled.
     for view in [View::Beauty, View::Diffuse, View::Specular, View::Bounds, View::Cost, View::Error] {
-        assert_eq!(textures_of(bumpy, view), said('d', "4 loaded", 10), "{view:?}");
+        assert_eq!(textures_of(bumpy, view), textures('d', "4 loaded", 10), "{view:?}");
     }
     let photons = &format!("{bumpy}[photons]\nenabled = true\ncount = 100\n");
-    assert_eq!(textures_of(photons, View::Photons), said('d', "4 loaded", 10));
+    assert_eq!(textures_of(photons, View::Photons), textures('d', "4 loaded", 10));
     for view in [View::Emission, View::Albedo] {
         assert_eq!(textures_of(photons, view), textures_of(bumpy, view), "{view:?}");
     }
 }
 
 #[test]
-fn a_view_looks_up_no_texture_that_it_does_not_load() {
+fn view_does_not_look_up_missing_textures() {
     let ambient = |scene: &str| scene.replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
     for (view, scene) in [
         (View::Shadow, SCENE.to_owned()),
@@ -138,13 +138,13 @@ fn a_view_looks_up_no_texture_that_it_does_not_load() {
 }
 
 #[test]
-fn a_view_without_textures_shows_what_it_would_with_them() {
+fn unneeded_textures_do_not_change_a_view() {
     let bumpy_scene = format!("{SCENE}{BUMPY}").replacen("samples = 4", &format!("samples = 4{AMBIENT}"), 1);
     for view in
         [View::Normal, View::Depth, View::Uv, View::Shadow, View::Albedo, View::Ambient, View::Emission]
     {
         for scene in [SCENE, &bumpy_scene] {
-            // A black texel reflects nothing; what arrives there is shown all the same.
+            // A black texel reflects nothing, but the arriving light must still be visible.
             let bench = |view| {
                 let bench = bumpy(scene, view);
                 bench.write("skin.ppm", "P6\n1 1\n255\n\0\0\0");
@@ -152,7 +152,7 @@ fn a_view_without_textures_shows_what_it_would_with_them() {
             };
             let mut without = bench(view);
             without.done();
-            // All that the picture showed stays loaded, so that lights and trees over them do too.
+            // Textures of the beauty view stay loaded, so that dependent lights and trees are reused.
             let mut with = bench(View::Beauty);
             with.done();
             with.overrides.view = Some(view);

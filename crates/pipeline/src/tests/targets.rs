@@ -1,4 +1,4 @@
-//! Tests of files that are never overwritten.
+//! Tests of files that must not be overwritten.
 
 use std::ops::Range;
 use std::os::unix::fs::symlink;
@@ -14,7 +14,7 @@ use crate::settings::Checkpoints;
 use crate::turntable::Turn;
 use crate::world::World;
 
-/// The first conflicts reported, and the end of the request.
+/// Returns the first reported conflicts and the end of the request.
 fn conflicts_and_end(events: &[Event]) -> (Vec<String>, Option<&Event>) {
     let conflicts = events.iter().find_map(|event| match event {
         Event::Refused { conflicts, .. } => Some(conflicts.iter().map(|one| one.message.clone()).collect()),
@@ -24,7 +24,7 @@ fn conflicts_and_end(events: &[Event]) -> (Vec<String>, Option<&Event>) {
 }
 
 #[test]
-fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
+fn conflict_is_reported_but_the_image_is_shown() {
     let mut bench = Bench::new(SCENE);
     let (good, report) = (bench.path("good.png"), bench.path("r.json"));
     bench.overrides.outputs = vec![good.clone(), bench.path("skin.ppm")];
@@ -35,18 +35,18 @@ fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
     let events = bench.until_end(of);
     let (conflicts, end) = conflicts_and_end(&events);
     assert!(conflicts.len() == 1 && conflicts[0].contains("texture `skin`"), "{conflicts:?}");
-    let said = |event: &Event| matches!(event, Event::Refused { .. });
-    let shown = events.iter().position(|event| matches!(event, Event::Preview { .. })).expect("it is shown");
-    assert!(events.iter().position(said).expect("it is said") < shown, "before the work");
-    assert_eq!(events.iter().filter(|event| said(event)).count(), 1, "once");
+    let is_refusal = |event: &Event| matches!(event, Event::Refused { .. });
+    let shown = events.iter().position(|event| matches!(event, Event::Preview { .. })).expect("a preview");
+    assert!(events.iter().position(is_refusal).expect("a refusal") < shown, "before the work");
+    assert_eq!(events.iter().filter(|event| is_refusal(event)).count(), 1, "once");
     let Some(Event::Done { report: made, warnings, .. }) = end else { panic!("{end:?}") };
     assert_eq!((made.image.path.as_deref(), made.image.complete), (None, true));
     assert_eq!(made.stages[Stage::Write as usize].status, Status::Skipped);
-    assert!(warnings.iter().any(|one| one.message == conflicts[0]), "it holds to the end");
+    assert!(warnings.iter().any(|one| one.message == conflicts[0]), "it remains until the end");
     bench.worker.send(Command::Write);
-    assert!(matches!(bench.next(), Event::Refused { .. }), "by hand neither");
+    assert!(matches!(bench.next(), Event::Refused { .. }), "a write order is refused as well");
     assert!(!good.exists() && !report.exists(), "nothing is written");
-    // An edit ends it.
+    // An edit resolves the conflict.
     bench.edit("[textures.skin]\nfile = \"skin.ppm\"\n", "");
     bench.edit("{ texture = \"skin\" }", "[0.5, 0.5, 0.5]");
     let of = bench.send();
@@ -56,13 +56,13 @@ fn a_conflict_is_said_before_the_work_and_the_picture_shown_all_the_same() {
 }
 
 #[test]
-fn a_material_file_is_known_before_the_render() {
+fn material_files_are_checked_before_the_render() {
     let mut bench = Bench::new(SCENE);
     bench.write("mtl.json", "newmtl a\nmap_d alpha.ppm\n");
     bench.write("one.obj", &format!("mtllib mtl.json\n{OBJ}"));
-    // Whatever the call lets it replace.
+    // This applies even if files may be replaced.
     bench.overrides.replaces_foreign = true;
-    for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "a picture")] {
+    for (name, role) in [("mtl.json", "a material file"), ("alpha.ppm", "an image")] {
         bench.overrides.report = Some(bench.path(name));
         let of = bench.send();
         let events = bench.until_end(of);
@@ -76,7 +76,7 @@ fn a_material_file_is_known_before_the_render() {
 }
 
 #[test]
-fn nothing_that_is_watched_can_be_written() {
+fn watched_files_cannot_be_written() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.obj", &format!("mtllib one.mtl gone.mtl\n{OBJ}"));
     bench.write("one.mtl", "newmtl a\n");
@@ -93,7 +93,7 @@ fn nothing_that_is_watched_can_be_written() {
         bench.overrides.report = Some(file.path.clone());
         assert!(matches!(bench.failed(), Failure::Scene(_)), "{file:?}");
     }
-    // What a broken scene names is waited for, and the picture of the scene before cannot become it.
+    // Files that a broken scene references are watched, so the last good scene must not be written to them.
     bench.overrides.report = None;
     bench.overrides.outputs = vec![bench.path("later.ppm")];
     bench.done();
@@ -109,7 +109,7 @@ fn nothing_that_is_watched_can_be_written() {
 static LINK: std::sync::Mutex<Option<PathBuf>> = std::sync::Mutex::new(None);
 static IS_LINKED: AtomicBool = AtomicBool::new(false);
 
-/// During the first tile the link comes to lead to the texture.
+/// Replaces the link by one to the texture during the first tile.
 fn relinks(
     photons: Option<&PhotonMaps>,
     world: &World,
@@ -128,7 +128,7 @@ fn relinks(
 }
 
 #[test]
-fn a_link_that_changes_during_the_render_is_seen_before_the_write() {
+fn link_changed_during_the_render_is_noticed() {
     let mut bench = Bench::with(SCENE, relinks);
     let link = bench.path("out.ppm");
     symlink("elsewhere.ppm", &link).expect("a link");
@@ -142,7 +142,7 @@ fn a_link_that_changes_during_the_render_is_seen_before_the_write() {
 }
 
 #[test]
-fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
+fn broken_scene_replaces_only_own_outputs() {
     let mut bench = Bench::new(SCENE);
     let output = bench.path("out.ppm");
     bench.done();
@@ -152,19 +152,19 @@ fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Written { .. }), "nothing is lost");
     assert!(matches!(bench.next(), Event::WriteDone { .. }));
-    fs::write(&output, "a picture of somebody else").expect("written");
+    fs::write(&output, "another image").expect("written");
     bench.worker.send(Command::Write);
-    let Event::WriteFailed { message, .. } = bench.next() else { panic!("it is refused") };
-    assert!(message.contains("out.ppm") && message.contains("the scene has errors"), "{message}");
-    assert_eq!(fs::read(&output).expect("there"), b"a picture of somebody else");
-    // Where nothing is, nothing is lost.
+    let Event::WriteFailed { message, .. } = bench.next() else { panic!("a refusal") };
+    assert!(message.contains("out.ppm") && message.contains(crate::messages::SCENE_HAS_ERRORS), "{message}");
+    assert_eq!(fs::read(&output).expect("there"), b"another image");
+    // A missing file can be written.
     fs::remove_file(&output).expect("removed");
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Written { .. }));
 }
 
 #[test]
-fn a_finished_part_is_never_taken_for_a_checkpoint() {
+fn finished_part_is_not_replaced_by_a_checkpoint() {
     let mut bench = Bench::new(SCENE);
     let (out, part) = (bench.path("out"), bench.path("out.checkpoint"));
     bench.overrides.shard = Some((2, 2));
@@ -182,19 +182,19 @@ fn a_finished_part_is_never_taken_for_a_checkpoint() {
         Event::Checkpoint { news: CheckpointNews::Failed { message }, .. } => Some(message),
         _ => None,
     });
-    assert!(failed.is_some_and(|message| message.contains("is a finished part")), "{failed:?}");
+    assert!(failed.is_some_and(|message| message.contains("out.checkpoint")), "{failed:?}");
 }
 
 #[test]
-fn a_report_beside_a_checkpoint_is_refused_before_the_work() {
+fn report_cannot_replace_a_checkpoint() {
     let mut bench = Bench::with(SCENE, unused);
     bench.overrides.report = Some(bench.path("out.ppm.checkpoint"));
     let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
-    assert!(errors[0].message.contains("it is the checkpoint of"), "{errors:?}");
+    assert!(errors[0].message.contains("out.ppm.checkpoint"), "{errors:?}");
 }
 
 #[test]
-fn a_later_image_of_a_turntable_that_is_blocked_is_found_before_the_work() {
+fn blocked_later_frame_is_found_before_the_work() {
     let mut bench = Bench::with(SCENE, unused);
     bench.overrides.outputs = vec![bench.path("a_##.ppm")];
     bench.overrides.turn = Some(Turn { number: 0, of: 12 });
@@ -203,7 +203,7 @@ fn a_later_image_of_a_turntable_that_is_blocked_is_found_before_the_work() {
     assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");
 }
 
-/// A kernel that no test reaches.
+/// Panics, for tests that must not reach the render.
 fn unused(
     _: Option<&PhotonMaps>,
     _: &World,
@@ -212,5 +212,5 @@ fn unused(
     _: Range<u32>,
     _: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    panic!("the work begins");
+    panic!("the render begins");
 }

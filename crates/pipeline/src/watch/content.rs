@@ -1,4 +1,4 @@
-//! Contents of files, cheap to ask for again: a hash that is computed anew only if the file may have changed.
+//! Contents of files, identified by hashes that are recomputed only if the file may have changed.
 
 use std::collections::HashMap;
 use std::fs::Metadata;
@@ -17,38 +17,38 @@ use crate::system::file::{self, FileKind};
 /// A file that a request read or tried to read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct FileRead {
-    /// Its name.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Hash of the bytes that were decoded; for other files, the content at about that time.
+    /// Hash of the decoded bytes; for files that were not decoded, the content at about that time.
     pub content: Content,
 }
 
 /// Content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Content {
-    /// There is no such file.
+    /// The file does not exist.
     Missing,
-    /// It is no regular file, or may not be read.
+    /// Not a regular file, or not readable.
     Unusable(Obstacle),
-    /// A regular file with this hash, of its bytes or, if it is a very long one, of its time stamps.
+    /// A regular file. The hash covers its bytes or, for a very long file, its metadata.
     Hash([u8; 32]),
 }
 
-/// Obstacle to reading a file.
+/// Why a file cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Obstacle {
-    /// A folder.
+    /// A directory.
     Folder,
     /// A pipe, a socket or a device.
     Special,
-    /// A file of the kernel.
+    /// A file in a kernel file system such as `/proc`.
     Kernel,
-    /// Something that cannot be opened or read, for this reason.
+    /// The file cannot be opened or read.
     Error(ErrorKind),
 }
 
 impl Content {
-    /// Add it to what a stage read.
+    /// Adds the content to a stage's fingerprint.
     pub(crate) fn add_to(self, key: &mut Fingerprint) {
         match self {
             Self::Missing => key.u64(0),
@@ -58,30 +58,30 @@ impl Content {
     }
 }
 
-/// Younger changes than this are not told apart by every file system's time stamps.
+/// Changes within this time may get the same time stamp on some file systems.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Most bytes that are hashed: those of the longest file that is decoded. For longer files the stamp counts instead of the content, so
-/// that nobody reads through a sparse file of terabytes.
+/// Maximum number of bytes that are hashed, which covers the longest file that is decoded. Longer files are compared by
+/// their metadata, so that a sparse file of terabytes is not read.
 const MOST_HASHED: u64 = 4 << 30;
-/// Bytes between two looks at the token.
+/// Bytes between two checks of the token.
 const CHUNK: usize = 1 << 20;
 
-/// Hashes of files, each taken once per change.
+/// Cache of file hashes.
 #[derive(Debug, Default)]
 pub struct Contents {
     known: Mutex<HashMap<PathBuf, (Stamp, Content)>>,
     /// Files that glimt wrote.
     pub outputs: Outputs,
-    /// Files that were read through.
+    /// Files that were hashed.
     #[cfg(test)]
     pub(crate) hashed: Mutex<Vec<PathBuf>>,
-    /// Files to be replaced, each with its new bytes, as soon as they have been hashed.
+    /// Replacement bytes of files, written right after the file has been hashed.
     #[cfg(test)]
     pub(crate) replacements: Mutex<HashMap<PathBuf, Vec<u8>>>,
 }
 
-/// Contents of files as one request sees them. Everything that a request makes of a file should have the same content: a request that
-/// notices a change in between starts again. The watcher finds files that change later.
+/// File contents as seen by one request. Each file must have the same content throughout a request: a request that
+/// notices a change starts again. The watcher finds later changes.
 #[derive(Debug)]
 pub(crate) struct Snapshot {
     contents: Arc<Contents>,
@@ -94,7 +94,7 @@ impl Snapshot {
         Self { contents, seen: Mutex::default(), changed: Mutex::default() }
     }
 
-    /// Content of the file when this request first looked at it.
+    /// Returns the content that this request first saw.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -106,7 +106,8 @@ impl Snapshot {
         Ok(*self.seen().entry(path.to_owned()).or_insert(content))
     }
 
-    /// Content of a file whose decoded bytes have this hash. Notes a change if this request has seen another content.
+    /// Returns the content of a file from the hash of its decoded bytes. Notes a change if this request has seen
+    /// another content.
     pub(crate) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
         let content = Content::Hash(hash);
         if *self.seen().entry(path.to_owned()).or_insert(content) != content {
@@ -115,7 +116,7 @@ impl Snapshot {
         content
     }
 
-    /// A file that another file names, with the content that was decoded.
+    /// Returns a file that another file references, with the content that was decoded.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -131,12 +132,12 @@ impl Snapshot {
         Ok(FileRead { path: path.clone(), content })
     }
 
-    /// A file that changed while this request read its files.
+    /// Returns a file that changed while this request was reading.
     pub(crate) fn changed(&self) -> Option<PathBuf> {
         self.changed.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Content that this snapshot has seen already.
+    /// Returns the content if this request has seen it.
     pub(crate) fn known(&self, path: &Path) -> Option<Content> {
         self.seen().get(path).copied()
     }
@@ -146,7 +147,7 @@ impl Snapshot {
     }
 }
 
-/// Properties that change with every change of a file, given some time between changes.
+/// File metadata that changes with every write, given some time between writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stamp {
     device: u64,
@@ -167,12 +168,12 @@ impl Stamp {
         }
     }
 
-    /// Substitute for the content of a file that is too long to hash.
+    /// Returns a substitute for the content of a file that is too long to hash.
     fn content(&self) -> Content {
         Content::Hash(*blake3::hash(format!("{self:?}").as_bytes()).as_bytes())
     }
 
-    /// Whether a change after `now` is sure to show in the stamp.
+    /// Whether a change after `now` is guaranteed to change the stamp.
     fn is_settled(&self, now: SystemTime) -> bool {
         let latest = self.modified.0.max(self.changed.0).max(0).unsigned_abs();
         let latest = SystemTime::UNIX_EPOCH + Duration::from_secs(latest);
@@ -181,10 +182,10 @@ impl Stamp {
 }
 
 impl Contents {
-    /// Current content of the file.
+    /// Returns the current content of a file.
     ///
     /// # Errors
-    /// [`Cancelled`], looked for once per mebibyte.
+    /// [`Cancelled`], checked once per mebibyte.
     pub fn read(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
         token.check()?;
         let now = SystemTime::now();
@@ -210,7 +211,7 @@ impl Contents {
         Ok(content)
     }
 
-    /// Forget all files but these.
+    /// Forgets all other files.
     pub fn retain(&self, mut keep: impl FnMut(&Path) -> bool) {
         self.known().retain(|path, _| keep(path));
     }
@@ -238,7 +239,7 @@ fn unreadable(error: &io::Error) -> Content {
 fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
     let mut file = match file::open(path) {
         Ok(Ok((file, _))) => file,
-        // It has been replaced since the last look.
+        // The file has been replaced since its metadata was read.
         Ok(Err(FileKind::Folder)) => return Ok(Content::Unusable(Obstacle::Folder)),
         Ok(Err(FileKind::Special)) => return Ok(Content::Unusable(Obstacle::Special)),
         Ok(Err(FileKind::Regular | FileKind::Kernel)) => return Ok(Content::Unusable(Obstacle::Kernel)),
@@ -263,7 +264,7 @@ mod tests {
     use std::fs::{self, File};
 
     #[test]
-    fn content_counts_and_not_the_time_stamp() {
+    fn content_is_compared_not_time_stamps() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let token = CancelToken::new();
@@ -282,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_terabytes_is_not_read() {
+    fn huge_file_is_not_read() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let file = File::create(&path).expect("a file");
@@ -298,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_sees_one_content_of_a_file() {
+    fn request_sees_one_content_per_file() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         let token = CancelToken::new();
@@ -312,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn an_old_file_is_hashed_once() {
+    fn old_file_is_hashed_once() {
         let folder = tempfile::tempdir().expect("a scratch folder");
         let path = folder.path().join("file");
         fs::write(&path, "a").expect("written");
@@ -325,7 +326,7 @@ mod tests {
         assert_eq!(
             read,
             Ok(Content::Unusable(Obstacle::Special)),
-            "the known answer stands while the stamp is the same"
+            "the cached content is valid while the stamp is unchanged"
         );
     }
 }

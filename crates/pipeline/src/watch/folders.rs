@@ -1,4 +1,4 @@
-//! The folders in which watched files are, and the system's hints of what happens there.
+//! Watches the folders of files, and converts the system's notifications to hints.
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
@@ -10,32 +10,32 @@ use std::sync::{Arc, Mutex, PoisonError};
 use notify::event::{AccessKind, AccessMode, EventKind, ModifyKind, RenameMode};
 use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
 
-/// An event about a watched name.
+/// A notification about a watched file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Hint {
-    /// It was closed after writing, or renamed into its place.
-    Whole(OsString),
-    /// It was written to, and is still open.
+    /// The file was closed after writing, or renamed into place.
+    Complete(OsString),
+    /// The file was written to and is still open.
     Written(OsString),
-    /// It was removed or renamed away.
+    /// The file was removed or renamed away.
     Gone(OsString),
-    /// Something else, perhaps to a name that is not known.
+    /// Something else happened, perhaps to an unknown file.
     Touched,
 }
 
-/// Watches folders for what happens to some names in them.
+/// Set of watched folders.
 #[derive(Debug)]
 pub(super) struct Folders {
-    /// None where hints are not wanted or cannot be had.
+    /// `None` if notifications are unwanted or unavailable.
     watcher: Option<RecommendedWatcher>,
     names: Arc<Mutex<HashSet<OsString>>>,
-    /// All folders that are to be watched, and whether each is on another machine, which says nothing.
+    /// Folders to watch, and whether each is on a network file system, which sends no notifications.
     wanted: HashMap<PathBuf, bool>,
-    /// Watched folders, with their identities at that time.
+    /// Watched folders, with their identities when the watch was added.
     watched: HashMap<PathBuf, Identity>,
 }
 
-/// Device and number of a folder: another one may take its name.
+/// Device and inode of a folder, which differ if another folder takes its name.
 type Identity = (u64, u64);
 
 fn identity(folder: &Path) -> Option<Identity> {
@@ -67,12 +67,12 @@ impl Folders {
         Self { watcher, names, wanted: HashMap::new(), watched: HashMap::new() }
     }
 
-    /// Whether the system reports changes of all files.
+    /// Whether notifications cover all folders.
     pub(super) fn gives_hints(&self) -> bool {
         self.watcher.is_some() && self.watched.len() == self.wanted.len()
     }
 
-    /// Watch the folders of these files: of the name, and of what it leads to if it is a link.
+    /// Watches the folders of these files and, for links, of their targets.
     pub(super) fn set<'a>(&mut self, files: impl Iterator<Item = &'a PathBuf>) {
         let mut folders = HashSet::new();
         let mut names = HashSet::new();
@@ -87,7 +87,7 @@ impl Folders {
                 add(&canonical);
             }
         }
-        // An event under a folder's own name reports that the folder is gone.
+        // An event under a folder's own name reports that the folder was removed.
         let own = folders
             .iter()
             .filter_map(|folder| folder.canonicalize().ok()?.file_name().map(ToOwned::to_owned));
@@ -99,7 +99,7 @@ impl Folders {
         self.watch_wanted();
     }
 
-    /// Watch those again whose names other folders have now, and those that are back.
+    /// Watches folders again that were replaced or recreated.
     pub(super) fn renew_lost(&mut self) {
         let lost: HashSet<PathBuf> = self
             .watched
@@ -111,7 +111,7 @@ impl Folders {
         self.watch_wanted();
     }
 
-    /// A hint was missed: none of them may be watched as it should be.
+    /// Watches all folders again after a notification was missed, because any of the watches may be broken.
     pub(super) fn renew(&mut self) {
         self.release(|_| true);
         self.watch_wanted();
@@ -122,7 +122,7 @@ impl Folders {
         self.watched.retain(|folder, _| {
             let stays = !is_released(folder);
             if !stays {
-                // It may have been removed: then there is nothing to end.
+                // The folder may have been removed, which ended the watch.
                 let _ = watcher.unwatch(folder);
             }
             stays
@@ -135,7 +135,7 @@ impl Folders {
             if *is_remote || self.watched.contains_key(folder) {
                 continue;
             }
-            // Looked at before: one that changes in between is then seen as another one.
+            // Take the identity first, so that a folder replaced in between counts as replaced.
             if let Some(identity) = identity(folder)
                 && watcher.watch(folder, RecursiveMode::NonRecursive).is_ok()
             {
@@ -145,20 +145,20 @@ impl Folders {
     }
 }
 
-/// Meaning of an event for these names. Reading does not count as a change: a watcher that reads must not wake itself.
+/// Converts an event to a hint about these names. Reads are ignored: otherwise a watcher that reads would wake itself.
 fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
     let mut of_paths = event.paths.iter().map(|path| path.file_name());
     let named = of_paths.clone().flatten().find(|name| names.contains(*name)).map(ToOwned::to_owned);
-    // A path that has no name, or no path at all, may stand for any.
+    // An event without a path or a file name may concern any file.
     let Some(name) = named else {
         let is_any = event.paths.is_empty() || of_paths.any(|name| name.is_none());
         return (is_any && !matches!(event.kind, EventKind::Access(_))).then_some(Hint::Touched);
     };
     match event.kind {
-        EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Whole(name)),
+        EventKind::Access(AccessKind::Close(AccessMode::Write)) => Some(Hint::Complete(name)),
         EventKind::Access(_) => None,
-        EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Whole(name)),
-        // Both of its ends have events of their own.
+        EventKind::Modify(ModifyKind::Name(RenameMode::To)) => Some(Hint::Complete(name)),
+        // Both ends also have events of their own.
         EventKind::Modify(ModifyKind::Name(RenameMode::Both)) => None,
         EventKind::Modify(ModifyKind::Data(_)) => Some(Hint::Written(name)),
         EventKind::Modify(ModifyKind::Name(RenameMode::From)) | EventKind::Remove(_) => {
@@ -170,11 +170,11 @@ fn hint(event: &Event, names: &HashSet<OsString>) -> Option<Hint> {
     }
 }
 
-/// Whether changes made by another machine would go unnoticed.
+/// Whether changes made by other machines cause no notifications.
 #[cfg(target_os = "linux")]
 fn is_remote(folder: &Path) -> bool {
     use nix::sys::statfs::{self, statfs};
-    // From linux/magic.h where the library has no name: SMB1 and SMB2 by the kernel's client, 9P, Ceph, AFS.
+    // From linux/magic.h, where nix has no constant: the kernel's SMB1 and SMB2 clients, 9P, Ceph, AFS.
     const OTHERS: [u32; 5] = [0xff53_4d42, 0xfe53_4d42, 0x0102_1997, 0x00c3_6400, 0x5346_414f];
     let Ok(stat) = statfs(folder) else { return false };
     let kind = stat.filesystem_type();
@@ -182,7 +182,7 @@ fn is_remote(folder: &Path) -> bool {
         || OTHERS.contains(&(kind.0 as u32))
 }
 
-/// Elsewhere the notifications are relied on, with the heartbeat behind them.
+/// Relies on notifications and the heartbeat on other systems.
 #[cfg(not(target_os = "linux"))]
 fn is_remote(_folder: &Path) -> bool {
     false
@@ -212,14 +212,14 @@ mod tests {
     }
 
     #[test]
-    fn an_event_says_whether_a_save_is_over() {
+    fn events_tell_whether_a_save_is_complete() {
         let names = HashSet::from([OsString::from("a.toml")]);
         let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let name = || OsString::from("a.toml");
         let closed = EventKind::Access(AccessKind::Close(AccessMode::Write));
         let renamed = |mode| EventKind::Modify(ModifyKind::Name(mode));
-        assert_eq!(of(closed, "/x/a.toml"), Some(Hint::Whole(name())));
-        assert_eq!(of(renamed(RenameMode::To), "/x/a.toml"), Some(Hint::Whole(name())));
+        assert_eq!(of(closed, "/x/a.toml"), Some(Hint::Complete(name())));
+        assert_eq!(of(renamed(RenameMode::To), "/x/a.toml"), Some(Hint::Complete(name())));
         assert_eq!(of(renamed(RenameMode::From), "/x/a.toml"), Some(Hint::Gone(name())));
         assert_eq!(of(renamed(RenameMode::Both), "/x/a.toml"), None);
         assert_eq!(of(EventKind::Remove(RemoveKind::File), "/x/a.toml"), Some(Hint::Gone(name())));
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_and_other_names_are_no_hint() {
+    fn reads_and_other_names_are_ignored() {
         let names = HashSet::from([OsString::from("a.toml")]);
         let of = |kind, path: &str| hint(&Event::new(kind).add_path(PathBuf::from(path)), &names);
         let opened = EventKind::Access(AccessKind::Open(AccessMode::Any));

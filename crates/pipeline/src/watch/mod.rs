@@ -1,20 +1,21 @@
-//! Says when a file that a scene depends on holds something else.
+//! Reports when a file that a scene depends on has changed.
 //!
-//! Editors save in many ways: in place, by rename, by unlink and rewrite. So folders are watched, of the name and
-//! of what a link leads to; what happens there is taken as a hint only. The files' contents are compared, and only a
-//! difference counts. A file that was closed after writing or renamed into its place is looked at at once; one that
-//! is still being written, after a short quiet. Where hints cannot be had (network file systems, no watches left)
-//! the contents' time stamps are looked at several times a second, and every two seconds everywhere. So they are while
-//! a folder is gone, the working folder too, until one of its name is there.
+//! Editors save in many ways: in place, by renaming, by removing and rewriting. So the watcher observes folders, both
+//! of a link and of its target, and treats notifications only as hints. It compares contents and reports only real
+//! changes. A file that was closed after writing or renamed into place is checked at once; a file that is still being
+//! written, after a short pause. Without notifications (network file systems, no watches left) it checks time stamps
+//! several times a second, and otherwise every two seconds. The same holds while a folder or the working directory is
+//! missing.
 //!
-//! A program may write in pieces. So [`News::Settled`] follows a change once no more changes are expected: whoever finds the file
-//! broken waits for that before reporting errors.
+//! A program may write in several steps. So [`News::Settled`] follows a change once no more changes are expected.
+//! Errors in a file are reported only then.
 
+mod change_tracker;
 pub mod content;
 mod folders;
-mod growth;
-mod home;
+
 pub mod outputs;
+mod working_folder;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -22,39 +23,40 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
+use self::change_tracker::ChangeTracker;
 use self::content::{Content, Contents, FileRead};
 use self::folders::{Folders, Hint};
-use self::growth::Growth;
-pub use self::home::missing_folder;
-use self::outputs::Suspects;
+use self::outputs::UnconfirmedChanges;
 pub use self::outputs::{Lost, OutputChange};
+pub use self::working_folder::missing_folder;
 use crate::control::CancelToken;
 
-/// Between two looks where hints are had.
+/// Interval between checks while notifications work.
 const HEARTBEAT: Duration = Duration::from_secs(2);
-/// Between two looks where no hints are had.
+/// Interval between checks without notifications.
 const POLL: Duration = Duration::from_millis(200);
-/// Shortest time between two reports of a change: enough for a first picture while saves never stop.
+/// Minimum time between two reported changes, long enough for a first image during continuous saves.
 const BETWEEN_CHANGES: Duration = Duration::from_millis(100);
 
-/// Times that files must be still, or may be in motion, before the watcher reacts.
+/// Delays before the watcher reacts to hints.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Waits {
-    /// Without a hint, after which a file that is being written is looked at.
+pub(super) struct WatchDelays {
+    /// Time without a hint after which a file that is being written is checked.
     quiet: Duration,
-    /// The same where a file is missing or empty: most likely it is being replaced.
+    /// The same for a missing or empty file, which is probably being replaced.
     quiet_missing: Duration,
-    /// The longest wait for quiet.
+    /// Maximum delay of a check.
     longest: Duration,
-    /// Without a hint, after which files are settled. Programs that write a file in two goes take a fraction of it.
+    /// Time without a hint after which files have settled. Programs that write a file in two steps take a fraction of
+    /// it.
     settle: Duration,
-    /// The same while a file was written and not closed: longer than a network makes `scp` or `sftp` pause.
+    /// The same while a file is open for writing: longer than network stalls of `scp` or `sftp`.
     settle_open: Duration,
-    /// The longest that files are unsettled, whatever happens to them.
+    /// Maximum time until files count as settled, whatever happens to them.
     settle_longest: Duration,
 }
 
-impl Default for Waits {
+impl Default for WatchDelays {
     fn default() -> Self {
         Self {
             quiet: Duration::from_millis(40),
@@ -70,31 +72,31 @@ impl Default for Waits {
 /// News from a watcher.
 #[derive(Clone, Debug)]
 pub enum News {
-    /// A file has another content, whole as far as can be told.
+    /// The content of a file changed, and the save appears complete.
     Changed(Changed),
-    /// The files that changed stay as they are: nobody seems to be writing.
+    /// The changed files appear to be complete.
     Settled,
-    /// A file that glimt wrote was changed, or is as glimt wrote it again.
+    /// A file that glimt wrote was changed, or restored to what glimt wrote.
     Output(OutputChange),
 }
 
-/// Some file holds something else.
+/// A change of at least one file.
 #[derive(Clone, Copy, Debug)]
 pub struct Changed {
-    /// When the first sign of it came: the start of "from save to first changed cell".
+    /// Time of the first hint, where the measured time from save to screen starts.
     pub noticed: Instant,
 }
 
-/// Watches files until it is dropped.
+/// Handle of the watcher thread, which ends when this is dropped.
 #[derive(Debug)]
 pub struct Watcher {
     orders: Sender<Message>,
 }
 
 enum Message {
-    /// Something happened to a watched name.
+    /// A hint about a watched file.
     Hint(Hint),
-    /// Watch these, which were read after that, and these, which were read before.
+    /// WatchThread these files, which were read after the given time, and these, which were read earlier.
     Files(Vec<FileRead>, Vec<FileRead>, Instant),
     /// The worker has written a file.
     Outputs,
@@ -102,47 +104,57 @@ enum Message {
 }
 
 impl Watcher {
-    /// Starts without watching anything. `poll`: do not rely on the system's notifications. `contents`: the worker's knowledge of
-    /// files, so that no file is hashed twice.
+    /// Starts the watcher without files. `poll` disables the system's notifications. `contents` is shared with the
+    /// worker, so that no file is hashed twice.
     ///
     /// # Errors
-    /// The system has no thread left.
+    /// The system cannot start a thread.
     pub fn start(
         poll: bool,
         contents: Arc<Contents>,
         say: impl FnMut(News) + Send + 'static,
     ) -> std::io::Result<Self> {
-        Self::start_with(poll, contents, Waits::default(), say)
+        Self::start_with(poll, contents, WatchDelays::default(), say)
     }
 
     fn start_with(
         poll: bool,
         contents: Arc<Contents>,
-        waits: Waits,
+        delays: WatchDelays,
         say: impl FnMut(News) + Send + 'static,
     ) -> std::io::Result<Self> {
-        home::remember();
+        working_folder::remember();
         let (orders, received) = mpsc::channel();
         let hints = orders.clone();
         let folders = Folders::new(poll, move |hint| {
-            // The watcher is gone: nobody wants hints.
+            // The send fails only after the watcher has ended.
             let _ = hints.send(Message::Hint(hint));
         });
-        let growth = Growth::new(waits);
+        let change_tracker = ChangeTracker::new(delays);
         let (files, pending, suspects) = Default::default();
-        let quiet = waits.quiet_missing;
-        let watch = Watch { folders, is_home: true, contents, files, growth, pending, suspects, quiet, say };
+        let quiet = delays.quiet_missing;
+        let watch = WatchThread {
+            folders,
+            has_working_folder: true,
+            contents,
+            files,
+            change_tracker,
+            pending,
+            suspects,
+            quiet,
+            say,
+        };
         std::thread::Builder::new().name("glimt-watch".to_owned()).spawn(move || watch.run(&received))?;
         Ok(Self { orders })
     }
 
-    /// Watches these files and no others: files read after `since`, and files known from before. A file with another content than
-    /// given counts as changed, unless a change was reported since it was read.
+    /// Watches only these files: `read`, which were read after `since`, and `before`, which are older. A file whose
+    /// content differs from the given one counts as changed, unless a change was reported since it was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));
     }
 
-    /// Watches the files that the worker has written by now.
+    /// Watches the files that the worker has written.
     pub fn watch_outputs(&self) {
         let _ = self.orders.send(Message::Outputs);
     }
@@ -154,29 +166,30 @@ impl Drop for Watcher {
     }
 }
 
-struct Watch<F> {
+struct WatchThread<F> {
     folders: Folders,
-    /// Whether the working folder is there.
-    is_home: bool,
+    /// Whether the working directory exists.
+    has_working_folder: bool,
     contents: Arc<Contents>,
-    /// Contents of the files when a change was last reported, or when they were last read, whichever is later; and that time.
+    /// Content of each file when a change was last reported or the file was last read, whichever is later, and that
+    /// time.
     files: HashMap<PathBuf, (Content, Instant)>,
-    growth: Growth,
-    /// Changes that the last look found and did not report.
+    change_tracker: ChangeTracker,
+    /// Changes that the last check found but did not report.
     pending: Vec<FileRead>,
-    /// Changes of outputs that may pass.
-    suspects: Suspects,
-    /// Time after which they do not.
+    /// Changes of outputs that may be temporary.
+    suspects: UnconfirmedChanges,
+    /// Time after which a missing file or a changed output is reported.
     quiet: Duration,
     say: F,
 }
 
-impl<F: FnMut(News)> Watch<F> {
+impl<F: FnMut(News)> WatchThread<F> {
     fn run(mut self, orders: &Receiver<Message>) {
         loop {
             let pause = self.next_look().saturating_duration_since(Instant::now());
             match orders.recv_timeout(pause) {
-                Ok(Message::Hint(hint)) => self.growth.hint(hint, Instant::now()),
+                Ok(Message::Hint(hint)) => self.change_tracker.hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set(read, before, since),
                 Ok(Message::Outputs) => self.set_folders(),
                 Err(RecvTimeoutError::Timeout) => self.look(Instant::now()),
@@ -186,9 +199,9 @@ impl<F: FnMut(News)> Watch<F> {
     }
 
     fn next_look(&self) -> Instant {
-        let pause = if self.is_home && self.folders.gives_hints() { HEARTBEAT } else { POLL };
+        let pause = if self.has_working_folder && self.folders.gives_hints() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
-        let due = [self.growth.due(), self.suspects.due(self.quiet)].into_iter().flatten().min();
+        let due = [self.change_tracker.due(), self.suspects.due(self.quiet)].into_iter().flatten().min();
         due.map_or(unhinted, |due| due.min(unhinted))
     }
 
@@ -199,18 +212,19 @@ impl<F: FnMut(News)> Watch<F> {
             self.files.insert(path, said.unwrap_or((content, since)));
         }
         for FileRead { path, content } in read {
-            // A report after `since` is newer than what was read; an earlier report is not, and the file may be as it was again.
+            // A report after `since` is newer than the content read. An earlier report is not: the file may have been
+            // restored.
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
             self.files.insert(path, said.unwrap_or((content, since)));
         }
         self.set_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
         if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
-            self.growth.hint(Hint::Touched, Instant::now());
+            self.change_tracker.hint(Hint::Touched, Instant::now());
         }
     }
 
-    /// Watches the folders of all files, and of the outputs.
+    /// Watches the folders of all files and outputs.
     fn set_folders(&mut self) {
         let outputs = self.contents.outputs.paths();
         let is_watched = |path: &Path| self.files.contains_key(path) || outputs.iter().any(|it| it == path);
@@ -218,9 +232,9 @@ impl<F: FnMut(News)> Watch<F> {
         self.folders.set(self.files.keys().chain(&outputs));
     }
 
-    /// It is time for a look, by the signs or without any.
+    /// Checks all files and reports changes.
     fn look(&mut self, now: Instant) {
-        self.is_home = home::is_there();
+        self.has_working_folder = working_folder::has_working_folder();
         self.folders.renew_lost();
         for change in self.suspects.look(&self.contents, self.quiet, now) {
             (self.say)(News::Output(change));
@@ -231,28 +245,29 @@ impl<F: FnMut(News)> Watch<F> {
             for FileRead { path, content } in found {
                 self.files.insert(path, (content, now));
             }
-            let noticed = self.growth.said(now);
+            let noticed = self.change_tracker.reported(now);
             (self.say)(News::Changed(Changed { noticed }));
         }
-        if self.growth.settles(now) {
+        if self.change_tracker.settles(now) {
             (self.say)(News::Settled);
         }
     }
 
-    /// Whether there is nothing to say of what a look found, not yet at least.
+    /// Whether the result of a check is not reported, or not yet.
     fn is_early(&mut self, found: &[FileRead], now: Instant) -> bool {
         let before = std::mem::take(&mut self.pending);
         if found.is_empty() {
-            self.growth.saw_nothing();
+            self.change_tracker.discard_hints();
             return true;
         }
-        let is_early = if self.growth.is_signed() {
+        let is_early = if self.change_tracker.has_hints() {
             let moves = !before.is_empty() && before != found;
-            self.growth.is_early(is_missing(found), moves, now)
+            self.change_tracker.is_early(is_missing(found), moves, now)
         } else {
-            // A hint was missed, or there are none: whether it is still being written the next look tells.
+            // A notification was missed or is unavailable: wait for the next check, because the file may still be
+            // written.
             self.folders.renew();
-            self.growth.hint(Hint::Touched, now);
+            self.change_tracker.hint(Hint::Touched, now);
             true
         };
         if is_early {
@@ -261,10 +276,10 @@ impl<F: FnMut(News)> Watch<F> {
         is_early
     }
 
-    /// Files that do not hold what was last said of them.
+    /// Returns the files whose content differs from the last reported one.
     fn differences(&self) -> Vec<FileRead> {
         let token = CancelToken::new();
-        // Nobody cancels this token.
+        // This token is never cancelled.
         let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(Content::Missing);
         let files = self.files.iter();
         let mut found: Vec<FileRead> = files
@@ -277,7 +292,7 @@ impl<F: FnMut(News)> Watch<F> {
     }
 }
 
-/// Whether a file is missing or empty: probably in the middle of being replaced.
+/// Whether a file is missing or empty, and probably being replaced.
 fn is_missing(files: &[FileRead]) -> bool {
     let empty = Content::Hash(*blake3::hash(b"").as_bytes());
     files.iter().any(|file| file.content == Content::Missing || file.content == empty)

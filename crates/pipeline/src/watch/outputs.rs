@@ -1,4 +1,4 @@
-//! Files that glimt wrote, and whether they still hold what it wrote.
+//! Files that glimt wrote, and whether other programs changed them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -8,17 +8,17 @@ use std::time::{Duration, Instant};
 use super::content::{Content, Contents};
 use crate::control::CancelToken;
 
-/// Change of a file by another program.
+/// What another program did to a file that glimt wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lost {
-    /// The file does not exist any more.
+    /// The file was removed.
     Removed,
     /// The file has another content.
     Replaced,
 }
 
 impl Lost {
-    /// A predicate for the file's name.
+    /// Returns a predicate whose subject is the file name.
     pub fn words(self) -> &'static str {
         match self {
             Self::Removed => "was removed",
@@ -27,16 +27,16 @@ impl Lost {
     }
 }
 
-/// A file that glimt wrote was changed, or is again as glimt wrote it.
+/// A change of a file that glimt wrote, or its restoration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutputChange {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The change. `None` if the file is as glimt wrote it.
+    /// The change. `None` if the file has the content that glimt wrote.
     pub lost: Option<Lost>,
 }
 
-/// Outputs by their paths, shared between the worker, which writes them, and the watcher.
+/// Written files by path, shared by the worker, which writes them, and the watcher.
 #[derive(Debug, Default)]
 pub struct Outputs(Mutex<HashMap<PathBuf, Output>>);
 
@@ -44,15 +44,15 @@ pub struct Outputs(Mutex<HashMap<PathBuf, Output>>);
 struct Output {
     /// The content that glimt wrote.
     content: Content,
-    /// Number of writes that began so far.
+    /// Number of writes started so far.
     writes: u64,
     is_being_written: bool,
-    /// The change that was reported last.
+    /// The last reported change.
     reported: Option<Lost>,
 }
 
 impl Outputs {
-    /// Notes that a file is about to be written: until [`Self::end`], it may have any content.
+    /// Records that a file is about to be written. It may have any content until [`Self::end`].
     pub(crate) fn begin(&self, path: &Path) {
         let mut known = self.known();
         let new = Output { content: Content::Missing, writes: 0, is_being_written: true, reported: None };
@@ -60,7 +60,7 @@ impl Outputs {
         (output.writes, output.is_being_written) = (output.writes + 1, true);
     }
 
-    /// Notes the content of a file that was written, or that it could not be written. Special files are not watched.
+    /// Records the content of a written file, or `None` if the write failed. Special files are not watched.
     pub(crate) fn end(&self, path: &Path, content: Option<Content>) {
         let mut known = self.known();
         let Some(output) = known.get_mut(path) else { return };
@@ -73,29 +73,29 @@ impl Outputs {
         }
     }
 
-    /// Forgets all files but these.
+    /// Forgets all other files.
     pub(crate) fn retain(&self, mut keep: impl FnMut(&PathBuf) -> bool) {
         self.known().retain(|path, _| keep(path));
     }
 
-    /// The files.
+    /// Returns all paths.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
         self.known().keys().cloned().collect()
     }
 
-    /// Files that do not hold what glimt wrote.
+    /// Returns the files that no longer have the content that glimt wrote.
     pub fn lost(&self, contents: &Contents) -> Vec<(PathBuf, Lost)> {
         let found = self.states(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
 
-    /// Files whose state differs from the reported one.
+    /// Returns the files whose state differs from the reported one.
     fn news(&self, contents: &Contents) -> Vec<OutputChange> {
         let found = self.states(contents).into_iter().filter(|(_, reported, lost)| reported != lost);
         found.map(|(path, _, lost)| OutputChange { path, lost }).collect()
     }
 
-    /// The reported and the current state of each file that is not being written.
+    /// Returns the reported and the current state of each file that is not being written.
     fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<Lost>, Option<Lost>)> {
         let before: Vec<(PathBuf, Output)> = {
             let known = self.known();
@@ -103,14 +103,14 @@ impl Outputs {
             idle.map(|(path, output)| (path.clone(), *output)).collect()
         };
         let state = |(path, output): (PathBuf, Output)| {
-            // Nobody cancels this token.
+            // This token is never cancelled.
             let now = contents.read(&path, &CancelToken::new()).unwrap_or(Content::Missing);
             let lost = match now {
                 now if now == output.content => None,
                 Content::Missing => Some(Lost::Removed),
                 Content::Hash(_) | Content::Unusable(_) => Some(Lost::Replaced),
             };
-            // A write may have begun since: then the content is glimt's own.
+            // Ignore the content if a write has begun since.
             let is_current = self.known().get(&path).is_some_and(|now| now.writes == output.writes);
             is_current.then_some((path, output.reported, lost))
         };
@@ -130,12 +130,12 @@ impl Outputs {
     }
 }
 
-/// Changes that were found and may pass: a program that replaces a file removes it first.
+/// Changes that may be temporary, because a program that replaces a file may remove it first.
 #[derive(Debug, Default)]
-pub(super) struct Suspects(Vec<(OutputChange, Instant)>);
+pub(super) struct UnconfirmedChanges(Vec<(OutputChange, Instant)>);
 
-impl Suspects {
-    /// Changes that have lasted for `quiet`; reports each once.
+impl UnconfirmedChanges {
+    /// Returns changes that have lasted for `quiet`, each once.
     pub(super) fn look(&mut self, contents: &Contents, quiet: Duration, now: Instant) -> Vec<OutputChange> {
         let before = std::mem::take(&mut self.0);
         let mut lasting = Vec::new();
@@ -152,7 +152,7 @@ impl Suspects {
         lasting
     }
 
-    /// Time of the next look. `None` if nothing is suspected.
+    /// Returns the time of the next check. `None` without unconfirmed changes.
     pub(super) fn due(&self, quiet: Duration) -> Option<Instant> {
         self.0.iter().map(|(_, since)| *since + quiet).min()
     }
@@ -177,7 +177,7 @@ mod tests {
     fn lasting_changes_are_reported_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        let (contents, mut suspects) = (Contents::default(), Suspects::default());
+        let (contents, mut suspects) = (Contents::default(), UnconfirmedChanges::default());
         let begin = Instant::now();
         let mut look = |contents: &Contents, after: u64| {
             let found = suspects.look(contents, QUIET, begin + Duration::from_millis(after));
@@ -185,27 +185,27 @@ mod tests {
         };
         write(&contents, &path, "one");
         assert_eq!(look(&contents, 0), []);
-        // Its own writes are no change, neither during them nor afterwards.
+        // glimt's own writes are not reported, neither during nor after them.
         contents.outputs.begin(&path);
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 1000), look(&contents, 2000)), (vec![], vec![]));
         write(&contents, &path, "two");
         assert_eq!((look(&contents, 3000), look(&contents, 4000)), (vec![], vec![]));
-        // Another program removes the file, then replaces it.
+        // Another program removes the file and then writes it.
         fs::remove_file(&path).expect("removed");
         assert_eq!(look(&contents, 5000), []);
         fs::write(&path, "of another").expect("written");
-        assert_eq!(look(&contents, 5300), [], "it may be on its way");
+        assert_eq!(look(&contents, 5300), [], "the file may be incomplete");
         assert_eq!(look(&contents, 5600), [Some(Lost::Replaced)]);
         fs::write(&path, "of another again").expect("written");
         assert_eq!((look(&contents, 6000), look(&contents, 7000)), (vec![], vec![]), "once");
         assert_eq!(contents.outputs.lost(&contents), [(path.clone(), Lost::Replaced)]);
         fs::remove_file(&path).expect("removed");
         assert_eq!((look(&contents, 8000), look(&contents, 9000)), (vec![], vec![Some(Lost::Removed)]));
-        // It is put back.
+        // Restore the file.
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 10_000), look(&contents, 11_000)), (vec![], vec![None]));
-        // glimt writes it again.
+        // Let glimt write the file again.
         fs::remove_file(&path).expect("removed");
         assert_eq!((look(&contents, 12_000), look(&contents, 13_000)), (vec![], vec![Some(Lost::Removed)]));
         write(&contents, &path, "three");
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_write_leaves_the_known_content() {
+    fn failed_write_keeps_the_known_content() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
         let contents = Contents::default();
@@ -223,7 +223,7 @@ mod tests {
         assert_eq!(contents.outputs.lost(&contents), []);
         fs::remove_file(&path).expect("removed");
         assert_eq!(contents.outputs.lost(&contents), [(path, Lost::Removed)]);
-        // One that was never written is not watched.
+        // A file that was never written is not watched.
         let other = folder.path().join("b.png");
         contents.outputs.begin(&other);
         contents.outputs.end(&other, None);

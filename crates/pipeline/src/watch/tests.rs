@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, channel};
 
 use super::*;
 
-/// Long after the last change that counts.
+/// Longer than any change takes to settle.
 const SETTLE: Duration = Duration::from_millis(900);
 
 /// Longer than any test.
@@ -18,16 +18,16 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// `a.toml` with the content `0`, watched.
+    /// Creates and watches `a.toml` with the content `0`.
     fn new(poll: bool) -> Self {
-        Self::with(poll, Waits::default())
+        Self::with(poll, WatchDelays::default())
     }
 
-    fn with(poll: bool, waits: Waits) -> Self {
+    fn with(poll: bool, delays: WatchDelays) -> Self {
         let folder = tempfile::tempdir().expect("a scratch folder");
         fs::write(folder.path().join("a.toml"), "0").expect("written");
         let (sender, news) = channel();
-        let watcher = Watcher::start_with(poll, Arc::default(), waits, move |news| {
+        let watcher = Watcher::start_with(poll, Arc::default(), delays, move |news| {
             let _ = sender.send(news);
         });
         let watcher = watcher.expect("a thread");
@@ -48,29 +48,29 @@ impl Scratch {
         };
         let since = Instant::now();
         self.watcher.set_files(paths.iter().map(read).collect(), Vec::new(), since);
-        // Folders are watched by the watcher's thread.
+        // Give the watcher's thread time to watch the folders.
         std::thread::sleep(Duration::from_millis(150));
     }
 
     #[track_caller]
     fn next(&self) -> News {
-        self.news.recv_timeout(Duration::from_secs(60)).expect("something is said")
+        self.news.recv_timeout(Duration::from_secs(60)).expect("news within a minute")
     }
 
-    /// Waits for one change and that nothing follows but that the files are quiet.
+    /// Expects one change, then that the files settle, then nothing.
     #[track_caller]
     fn expect_one(&self) {
-        assert!(matches!(self.next(), News::Changed(_)), "it is the first that is said");
-        assert!(matches!(self.next(), News::Settled), "a change too many");
+        assert!(matches!(self.next(), News::Changed(_)), "the first news is a change");
+        assert!(matches!(self.next(), News::Settled), "one change too many");
         self.expect_none();
     }
 
     #[track_caller]
     fn expect_none(&self) {
-        assert!(self.news.recv_timeout(SETTLE).is_err(), "news too many");
+        assert!(self.news.recv_timeout(SETTLE).is_err(), "unexpected news");
     }
 
-    /// Three saves with distinct contents, each noticed once.
+    /// Saves three distinct contents and expects one change each.
     #[track_caller]
     fn three_saves(&self, save: impl Fn(&str)) {
         for content in ["one", "two", "three"] {
@@ -80,7 +80,7 @@ impl Scratch {
     }
 }
 
-fn another_kind_of_what_is_no_file_is_a_change() {
+fn replacement_by_special_file_is_a_change() {
     use nix::sys::stat::Mode;
     let scratch = Scratch::new(false);
     let path = scratch.path("a.toml");
@@ -95,11 +95,11 @@ fn another_kind_of_what_is_no_file_is_a_change() {
     scratch.expect_one();
 }
 
-/// A way to save `a.toml` in a folder with a content.
+/// Saves a content as `a.toml` in a folder.
 type Save = fn(folder: &Path, content: &str);
 
-/// Ways in which editors save.
-const WAYS: [(&str, Save); 6] = [
+/// Methods by which editors save.
+const SAVE_METHODS: [(&str, Save); 6] = [
     ("truncate and write", |folder, content| {
         fs::write(folder.join("a.toml"), content).expect("written");
     }),
@@ -129,8 +129,8 @@ const WAYS: [(&str, Save); 6] = [
     }),
 ];
 
-/// Does things at once, as most of their time is waiting; a thread that fails tells its name.
-fn side_by_side<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static str, T)>) {
+/// Runs the tests concurrently, because they mostly wait. A thread that fails reports its name.
+fn run_concurrently<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static str, T)>) {
     std::thread::scope(|scope| {
         for (name, one) in all {
             let thread = std::thread::Builder::new().name(name.to_owned());
@@ -140,8 +140,8 @@ fn side_by_side<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static str,
 }
 
 #[test]
-fn each_way_to_save_is_one_change() {
-    side_by_side(WAYS.map(|(name, save)| {
+fn each_save_method_is_one_change() {
+    run_concurrently(SAVE_METHODS.map(|(name, save)| {
         let three_saves = move || {
             let scratch = Scratch::new(false);
             scratch.three_saves(|content| save(scratch.folder.path(), content));
@@ -156,30 +156,30 @@ macro_rules! named {
 }
 
 #[test]
-fn what_happens_to_watched_files_is_said() {
-    side_by_side(named![
-        another_kind_of_what_is_no_file_is_a_change,
-        polling_sees_three_saves_of_one_length,
-        a_link_whose_target_is_replaced,
-        a_link_that_is_turned_elsewhere,
-        the_same_content_again_and_other_files_are_no_change,
-        a_missing_file_is_watched_until_it_comes_and_said_when_it_goes,
-        a_folder_that_is_removed_and_made_again_is_watched_as_before,
-        another_folder_of_the_same_name_is_watched_by_its_hints,
-        a_change_between_reading_and_watching_is_seen,
-        a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_between,
-        saves_without_a_pause_are_said_now_and_then,
-        a_file_that_is_closed_after_writing_is_whole,
-        a_file_that_is_renamed_into_its_place_is_whole,
-        a_save_by_way_of_a_backup_is_whole_at_its_last_step,
-        a_file_that_is_still_open_is_looked_at_when_it_is_closed,
-        a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until_it_is_closed,
-        a_file_that_comes_in_two_pieces_settles_after_the_second,
-        a_file_that_never_ends_settles_at_last,
+fn changes_of_watched_files_are_reported() {
+    run_concurrently(named![
+        replacement_by_special_file_is_a_change,
+        polling_sees_saves_of_equal_length,
+        replaced_link_target_is_a_change,
+        retargeted_link_is_a_change,
+        same_content_and_other_files_are_ignored,
+        missing_file_is_watched,
+        recreated_folder_is_watched,
+        swapped_folder_is_watched,
+        change_before_watching_is_noticed,
+        restored_file_is_a_change_if_read_between,
+        continuous_saves_are_rate_limited,
+        closed_file_is_complete,
+        renamed_file_is_complete,
+        backup_save_is_complete_at_its_last_step,
+        open_file_is_checked_when_closed,
+        open_file_settles_only_when_closed,
+        two_part_write_settles_after_the_second,
+        endless_write_settles_eventually,
     ]);
 }
 
-fn polling_sees_three_saves_of_one_length() {
+fn polling_sees_saves_of_equal_length() {
     let scratch = Scratch::new(true);
     for content in ["1", "2", "3"] {
         fs::write(scratch.path("a.toml"), content).expect("written");
@@ -187,7 +187,7 @@ fn polling_sees_three_saves_of_one_length() {
     }
 }
 
-fn a_link_whose_target_is_replaced() {
+fn replaced_link_target_is_a_change() {
     let scratch = Scratch::new(false);
     fs::create_dir(scratch.path("elsewhere")).expect("a folder");
     let target = scratch.path("elsewhere/real.toml");
@@ -202,7 +202,7 @@ fn a_link_whose_target_is_replaced() {
     });
 }
 
-fn a_link_that_is_turned_elsewhere() {
+fn retargeted_link_is_a_change() {
     let scratch = Scratch::new(false);
     fs::write(scratch.path("one"), "1").expect("written");
     fs::write(scratch.path("two"), "2").expect("written");
@@ -214,7 +214,7 @@ fn a_link_that_is_turned_elsewhere() {
     scratch.expect_one();
 }
 
-fn the_same_content_again_and_other_files_are_no_change() {
+fn same_content_and_other_files_are_ignored() {
     let scratch = Scratch::new(false);
     fs::write(scratch.path("a.toml"), "0").expect("written");
     fs::write(scratch.path("b.png"), "1").expect("written");
@@ -222,7 +222,7 @@ fn the_same_content_again_and_other_files_are_no_change() {
     scratch.expect_none();
 }
 
-fn a_missing_file_is_watched_until_it_comes_and_said_when_it_goes() {
+fn missing_file_is_watched() {
     let scratch = Scratch::new(false);
     let path = scratch.path("mesh.obj");
     scratch.watch(&[&path]);
@@ -233,7 +233,7 @@ fn a_missing_file_is_watched_until_it_comes_and_said_when_it_goes() {
     scratch.expect_one();
 }
 
-fn a_folder_that_is_removed_and_made_again_is_watched_as_before() {
+fn recreated_folder_is_watched() {
     let scratch = Scratch::new(false);
     let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
     let make = |content: &str| {
@@ -244,20 +244,20 @@ fn a_folder_that_is_removed_and_made_again_is_watched_as_before() {
     scratch.watch(&[&path]);
     fs::remove_dir_all(&folder).expect("removed");
     scratch.expect_one();
-    // While it is gone nobody says so again.
+    // While the folder is missing, there is no further report.
     scratch.expect_none();
     make("1");
     scratch.expect_one();
     scratch.three_saves(|content| fs::write(&path, content).expect("written"));
 }
 
-fn another_folder_of_the_same_name_is_watched_by_its_hints() {
+fn swapped_folder_is_watched() {
     let scratch = impatient();
     let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
     fs::create_dir(&folder).expect("a folder");
     fs::write(&path, "0").expect("written");
     scratch.watch(&[&path]);
-    // The same file in it: nothing has changed.
+    // Swap in a folder with the same file: nothing changes.
     fs::create_dir(scratch.path("new")).expect("a folder");
     fs::write(scratch.path("new/a.toml"), "0").expect("written");
     fs::rename(&folder, scratch.path("old")).expect("renamed");
@@ -267,7 +267,7 @@ fn another_folder_of_the_same_name_is_watched_by_its_hints() {
     scratch.three_saves(|content| fs::write(&path, content).expect("written"));
 }
 
-fn a_change_between_reading_and_watching_is_seen() {
+fn change_before_watching_is_noticed() {
     let scratch = Scratch::new(false);
     let path = scratch.path("b.toml");
     fs::write(&path, "new").expect("written");
@@ -276,20 +276,20 @@ fn a_change_between_reading_and_watching_is_seen() {
     scratch.expect_one();
 }
 
-fn a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_between() {
+fn restored_file_is_a_change_if_read_between() {
     let scratch = Scratch::new(false);
     let path = scratch.path("a.toml");
     fs::write(&path, "said").expect("written");
     scratch.expect_one();
-    // Something else was there for a moment: a request read it, the watcher did not.
+    // The file had another content for a moment, which a request read and the watcher did not.
     let content = Content::Hash(*blake3::hash(b"between").as_bytes());
     let between = vec![FileRead { path: path.clone(), content }];
     scratch.watcher.set_files(between.clone(), Vec::new(), Instant::now());
     scratch.expect_one();
-    // What is known from before a save says nothing.
+    // Contents known from before a save are ignored.
     scratch.watcher.set_files(Vec::new(), between, Instant::now());
     scratch.expect_none();
-    // A report after a request began is newer than what the request read.
+    // A report after the start of a request is newer than the content it read.
     let begun = Instant::now();
     fs::write(&path, "said later").expect("written");
     scratch.expect_one();
@@ -297,7 +297,7 @@ fn a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_
     scratch.expect_none();
 }
 
-fn saves_without_a_pause_are_said_now_and_then() {
+fn continuous_saves_are_rate_limited() {
     let scratch = Scratch::new(false);
     let begin = Instant::now();
     for i in 0..150 {
@@ -314,17 +314,17 @@ fn saves_without_a_pause_are_said_now_and_then() {
     scratch.expect_none();
 }
 
-/// Whatever needs a quiet time is never said.
+/// Watches with endless delays, so that only complete saves are reported.
 fn impatient() -> Scratch {
-    Scratch::with(false, Waits { quiet: NEVER, longest: NEVER, ..Waits::default() })
+    Scratch::with(false, WatchDelays { quiet: NEVER, longest: NEVER, ..WatchDelays::default() })
 }
 
-fn a_file_that_is_closed_after_writing_is_whole() {
+fn closed_file_is_complete() {
     let scratch = impatient();
     scratch.three_saves(|content| fs::write(scratch.path("a.toml"), content).expect("written"));
 }
 
-fn a_file_that_is_renamed_into_its_place_is_whole() {
+fn renamed_file_is_complete() {
     let scratch = impatient();
     scratch.three_saves(|content| {
         fs::write(scratch.path("a.toml.tmp"), content).expect("written");
@@ -332,7 +332,7 @@ fn a_file_that_is_renamed_into_its_place_is_whole() {
     });
 }
 
-fn a_save_by_way_of_a_backup_is_whole_at_its_last_step() {
+fn backup_save_is_complete_at_its_last_step() {
     let scratch = impatient();
     scratch.three_saves(|content| {
         fs::rename(scratch.path("a.toml"), scratch.path("a.toml~")).expect("renamed");
@@ -345,23 +345,23 @@ fn a_save_by_way_of_a_backup_is_whole_at_its_last_step() {
     });
 }
 
-/// The watched file opened for writing, empty now.
+/// Truncates the watched file and opens it for writing.
 fn open(scratch: &Scratch) -> fs::File {
     fs::File::create(scratch.path("a.toml")).expect("opened")
 }
 
-fn a_file_that_is_still_open_is_looked_at_when_it_is_closed() {
+fn open_file_is_checked_when_closed() {
     let scratch = impatient();
     let mut file = open(&scratch);
     file.write_all(b"half").expect("written");
-    assert!(scratch.news.recv_timeout(SETTLE).is_err(), "it is still growing");
+    assert!(scratch.news.recv_timeout(SETTLE).is_err(), "the file is still open");
     file.write_all(b" and half").expect("written");
     drop(file);
     scratch.expect_one();
 }
 
-fn a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until_it_is_closed() {
-    let scratch = Scratch::with(false, Waits { settle_open: NEVER, ..Waits::default() });
+fn open_file_settles_only_when_closed() {
+    let scratch = Scratch::with(false, WatchDelays { settle_open: NEVER, ..WatchDelays::default() });
     let mut file = open(&scratch);
     file.write_all(b"half").expect("written");
     assert!(matches!(scratch.next(), News::Changed(_)));
@@ -373,8 +373,11 @@ fn a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until
     assert!(matches!(scratch.next(), News::Settled));
 }
 
-fn a_file_that_comes_in_two_pieces_settles_after_the_second() {
-    let scratch = Scratch::with(false, Waits { settle: 5 * Waits::default().settle, ..Waits::default() });
+fn two_part_write_settles_after_the_second() {
+    let scratch = Scratch::with(
+        false,
+        WatchDelays { settle: 5 * WatchDelays::default().settle, ..WatchDelays::default() },
+    );
     fs::write(scratch.path("a.toml"), "half").expect("written");
     assert!(matches!(scratch.next(), News::Changed(_)));
     std::thread::sleep(Duration::from_millis(200));
@@ -382,9 +385,13 @@ fn a_file_that_comes_in_two_pieces_settles_after_the_second() {
     scratch.expect_one();
 }
 
-fn a_file_that_never_ends_settles_at_last() {
-    let waits = Waits { settle_open: NEVER, settle_longest: Duration::from_millis(300), ..Waits::default() };
-    let scratch = Scratch::with(false, waits);
+fn endless_write_settles_eventually() {
+    let delays = WatchDelays {
+        settle_open: NEVER,
+        settle_longest: Duration::from_millis(300),
+        ..WatchDelays::default()
+    };
+    let scratch = Scratch::with(false, delays);
     let mut file = open(&scratch);
     file.write_all(b"half").expect("written");
     assert!(matches!(scratch.next(), News::Changed(_)));

@@ -1,7 +1,7 @@
 //! The mouse, the crosshair, and the inspected object.
 
 use crate::event::FilePosition;
-use crate::pipeline::protocol::Spot;
+use crate::pipeline::protocol::ImagePosition;
 
 /// A press of the left button on the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub(crate) struct Press {
     pub row: u16,
     pub has_moved: bool,
     /// Position in the image at which the press started.
-    pub from: Option<Spot>,
+    pub from: Option<ImagePosition>,
 }
 
 /// Purpose of a pick query.
@@ -32,7 +32,7 @@ pub(crate) struct SelectionState {
     /// Whether the next drag selects the region to render first.
     pub is_marking: bool,
     /// Position of the last click; initially the center of the image.
-    pub crosshair: Spot,
+    pub crosshair: ImagePosition,
     /// Purpose of the last pick query.
     pub purpose: PickPurpose,
     /// Facts about the inspected object, until the next key.
@@ -50,7 +50,7 @@ impl SelectionState {
             press: None,
             is_focusing: false,
             is_marking: false,
-            crosshair: Spot { x: 0.5, y: 0.5 },
+            crosshair: ImagePosition { x: 0.5, y: 0.5 },
             purpose: PickPurpose::Inspect,
             facts: None,
             clicked: None,

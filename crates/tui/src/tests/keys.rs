@@ -9,7 +9,7 @@ use crate::fixtures::*;
 use crate::keymap::{self, KEYMAP};
 use crate::math::DVec3;
 use crate::messages;
-use crate::pipeline::protocol::{self, CameraEdit, Command, Spot, Writing};
+use crate::pipeline::protocol::{self, CameraEdit, Command, ImagePosition, Writing};
 use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
 use crate::preview_kind::PreviewKind;
 use crate::scene::description::{Integrator, Pose, Shadows};
@@ -151,7 +151,7 @@ fn check(action: Action, key: KeyPress, ui: &mut TestUi) {
                 [Effect::Send(Command::Preview(Some(size)))] => size.around,
                 other => panic!("{other:?}"),
             };
-            assert_eq!(around(&ui.key(key)), Some(Spot { x: 0.5, y: 0.5 }));
+            assert_eq!(around(&ui.key(key)), Some(ImagePosition { x: 0.5, y: 0.5 }));
             assert!(ui.text().contains("x back"), "{}", ui.text());
             assert_eq!(around(&ui.key(key)), None);
         }

@@ -8,7 +8,7 @@ use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, CameraEdit, Command, Kept, Picked, Section, Spot, Thing, Writing};
+use crate::pipeline::protocol::{self, CameraEdit, Command, Kept, Picked, Section, ImagePosition, Thing, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
@@ -30,7 +30,7 @@ fn click(ui: &mut TestUi, column: u16, row: u16) -> Vec<Effect> {
     mouse(ui, MouseKind::Release, column, row)
 }
 
-fn asked(effects: &[Effect]) -> Spot {
+fn asked(effects: &[Effect]) -> ImagePosition {
     match effects {
         [Effect::Send(Command::Pick(spot))] => *spot,
         other => panic!("{other:?}"),

@@ -4,7 +4,7 @@ use super::notices::{prompt, show_notice};
 use super::request::render;
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{Section, Spot};
+use crate::pipeline::protocol::{ImagePosition, Section};
 use crate::state::State;
 
 /// Width and height of a region around a position.
@@ -34,13 +34,13 @@ pub(super) fn leave(state: &mut State) {
 }
 
 /// Updates the region during a drag.
-pub(super) fn drag(state: &mut State, from: Spot, to: Spot) {
+pub(super) fn drag(state: &mut State, from: ImagePosition, to: ImagePosition) {
     state.request.first_section = Some(Section::between(from, to));
     state.dirty = true;
 }
 
 /// Ends a drag with the marked region, or one around the position.
-pub(super) fn release(state: &mut State, spot: Option<Spot>) -> Vec<Effect> {
+pub(super) fn release(state: &mut State, spot: Option<ImagePosition>) -> Vec<Effect> {
     match (state.request.first_section, spot) {
         (Some(marked), _) => take(state, marked),
         (None, Some(spot)) => take(state, around(spot)),
@@ -48,7 +48,7 @@ pub(super) fn release(state: &mut State, spot: Option<Spot>) -> Vec<Effect> {
     }
 }
 
-fn around(spot: Spot) -> Section {
+fn around(spot: ImagePosition) -> Section {
     let start = |middle: f64| (middle - SIDE / 2.0).clamp(0.0, 1.0 - SIDE);
     Section { left: start(spot.x), top: start(spot.y), width: SIDE, height: SIDE }
 }

@@ -4,13 +4,13 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::text::Tone;
-use crate::pipeline::protocol::{Section, Spot};
+use crate::pipeline::protocol::{ImagePosition, Section};
 use crate::preview_kind::PreviewKind;
 use crate::state::State;
 
 /// Draws the marks over an image in these cells.
 pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
-    let mut mark = |spot: Spot, symbols: [&str; 2]| {
+    let mut mark = |spot: ImagePosition, symbols: [&str; 2]| {
         let symbol = symbols[usize::from(state.display.kind == PreviewKind::Ascii)];
         let cell = cell_of(state, spot, cells).and_then(|place| buffer.cell_mut(place));
         if let Some(cell) = cell {
@@ -23,10 +23,10 @@ pub(super) fn draw(state: &State, cells: Rect, buffer: &mut Buffer) {
     {
         // The marks are inside the region.
         let (right, bottom) = (left + width * 0.999, top + height * 0.999);
-        mark(Spot { x: left, y: top }, ["┌", "+"]);
-        mark(Spot { x: right, y: top }, ["┐", "+"]);
-        mark(Spot { x: left, y: bottom }, ["└", "+"]);
-        mark(Spot { x: right, y: bottom }, ["┘", "+"]);
+        mark(ImagePosition { x: left, y: top }, ["┌", "+"]);
+        mark(ImagePosition { x: right, y: top }, ["┐", "+"]);
+        mark(ImagePosition { x: left, y: bottom }, ["└", "+"]);
+        mark(ImagePosition { x: right, y: bottom }, ["┘", "+"]);
     }
     if state.selection.is_focusing
         || state.selection.is_marking && state.request.first_section.is_none()
@@ -42,7 +42,7 @@ fn is_marked(state: &State) -> bool {
 }
 
 /// The cell of a position in the image, if it is visible.
-fn cell_of(state: &State, spot: Spot, cells: Rect) -> Option<(u16, u16)> {
+fn cell_of(state: &State, spot: ImagePosition, cells: Rect) -> Option<(u16, u16)> {
     let section = state.picture.shown.as_ref().and_then(|shown| shown.section);
     let Section { left, top, width, height } =
         section.unwrap_or(Section { left: 0.0, top: 0.0, width: 1.0, height: 1.0 });

@@ -16,7 +16,7 @@ use crate::history::ShownImage;
 use crate::messages;
 use crate::mosaic::{Grid, fit};
 use crate::options::PreviewChoice;
-use crate::pipeline::protocol::Spot;
+use crate::pipeline::protocol::ImagePosition;
 use crate::preview_kind::PreviewKind;
 use crate::rescale::rescaled;
 use crate::state::State;
@@ -54,13 +54,14 @@ pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &
 }
 
 /// The position in the image that a cell shows.
-pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
+pub(crate) fn spot_at(state: &State, column: u16, row: u16) -> Option<ImagePosition> {
     let shown = state.picture.shown.as_ref()?;
     let area = Layout::of(state).preview;
     let cells = PlacedImage::of(state, shown, area, in_cells(state.display.kind, state.display.depth)).cells;
     let share = |at: u16, start: u16, length: u16| (f64::from(at - start) + 0.5) / f64::from(length);
     let spot = || {
-        let spot = Spot { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
+        let spot =
+            ImagePosition { x: share(column, cells.x, cells.width), y: share(row, cells.y, cells.height) };
         shown.section.map_or(spot, |section| section.place(spot))
     };
     cells.contains((column, row).into()).then(spot)

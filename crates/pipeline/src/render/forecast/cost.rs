@@ -1,12 +1,12 @@
-//! Cost of samples, predicted from those before them.
+//! Cost of samples, predicted from earlier ones.
 
-/// Cost of the jobs in a cell: a part for each sample of a pixel, and a part for each pixel of a job.
+/// Cost of the jobs in a cell: a part per sample of a pixel, and a part per pixel of a job.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CellCost {
     seconds: f64,
-    /// Pixels times samples.
+    /// Sum of pixels times samples.
     units: f64,
-    /// Pixels, in each job anew.
+    /// Sum of the pixels of all jobs.
     pixels: f64,
     last: Option<JobCost>,
 }
@@ -16,12 +16,12 @@ pub(crate) struct CellCost {
 pub(crate) struct JobCost {
     pub(crate) seconds: f64,
     pub(crate) pixels: f64,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub(crate) samples: f64,
 }
 
 impl CellCost {
-    /// Weight of earlier jobs beside a new one: the first samples cost more than those of later passes.
+    /// Weight of earlier jobs relative to a new one, because the first samples cost more than those of later passes.
     const KEPT: f64 = 0.25;
 
     pub(crate) fn note(&mut self, job: JobCost, share: &mut PixelShare) {
@@ -32,7 +32,7 @@ impl CellCost {
         self.last = Some(job);
     }
 
-    /// Whether nothing is known of it.
+    /// Whether the cost has not been measured.
     pub(crate) fn is_unknown(&self) -> bool {
         !(self.units > 0.0)
     }
@@ -41,24 +41,24 @@ impl CellCost {
         self.seconds
     }
 
-    /// Samples that the cell's seconds were spent on; pixels count for their share.
+    /// Number of samples that would cost the cell's seconds, including the share of its pixels.
     pub(crate) fn worth(&self, share: PixelShare) -> f64 {
         share.worth(self.units, self.pixels)
     }
 }
 
-/// Cost of a pixel in a job, beside its samples.
+/// Cost of a pixel in a job, apart from its samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelShare {
-    /// A cell had n' samples in s' seconds, then n > n' in s. If a pixel costs as much as b samples, s/s' = (n + b)/(n' + b), so that
-    /// b = (s'n − sn')/(s − s'). The sum of the numerators.
+    /// A cell had n' samples in s' seconds, then n > n' in s. If a pixel costs as much as b samples, s/s' = (n + b)/(n'
+    /// + b), so that b = (s'n − sn')/(s − s'). This is the sum of the numerators.
     of_pixels: f64,
-    /// The sum of the denominators.
+    /// Sum of the denominators.
     of_samples: f64,
 }
 
 impl PixelShare {
-    /// The most that is believed, in samples.
+    /// Maximum cost of a pixel, in samples.
     const MOST: f64 = 4.0;
 
     fn note(&mut self, before: Option<JobCost>, now: JobCost) {
@@ -70,7 +70,7 @@ impl PixelShare {
         }
     }
 
-    /// Samples that would cost as much as jobs of so many samples (`units`) and pixels.
+    /// Returns the number of samples that cost as much as jobs with this many samples (`units`) and pixels.
     pub(crate) fn worth(self, units: f64, pixels: f64) -> f64 {
         let share = if self.of_samples > 0.0 { self.of_pixels / self.of_samples } else { 0.0 };
         units + share.clamp(0.0, Self::MOST) * pixels
@@ -82,8 +82,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_pixels_take_is_told_apart_from_what_samples_take() {
-        // Cells of 100 pixels, where a sample takes 1 and 3 seconds, and a pixel as much as half a sample.
+    fn pixel_and_sample_costs_are_separated() {
+        // Cells of 100 pixels, where a sample takes 1 or 3 seconds, and a pixel as long as half a sample.
         let (mut share, mut cells) = (PixelShare::default(), [CellCost::default(); 2]);
         for samples in [1.0, 1.0, 2.0, 4.0] {
             for (cell, rate) in cells.iter_mut().zip([1.0, 3.0]) {
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn chance_in_the_seconds_is_not_believed() {
+    fn implausible_times_are_clamped() {
         let of = |seconds: [f64; 2]| {
             let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
             for (seconds, samples) in seconds.into_iter().zip([1.0, 2.0]) {
@@ -107,15 +107,15 @@ mod tests {
             share.worth(0.0, 1.0)
         };
         assert_eq!(of([1.0, 2.0]), 0.0);
-        assert_eq!(of([1.0, 4.0]), 0.0, "more than twice as long for twice as many");
-        assert_eq!(of([1.0, 0.5]), 0.0, "less for more");
+        assert_eq!(of([1.0, 4.0]), 0.0, "twice the samples took more than twice as long");
+        assert_eq!(of([1.0, 0.5]), 0.0, "twice the samples took less time");
         assert_eq!(of([1.0, 1.001]), PixelShare::MOST);
     }
 
     #[test]
-    fn jobs_of_other_pixels_are_not_compared() {
+    fn jobs_with_other_pixels_are_not_compared() {
         let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
-        // A cell, then a half of it: as long for as many samples.
+        // A cell, then half of it with twice the samples.
         for (pixels, samples) in [(2.0, 1.0), (1.0, 2.0)] {
             cell.note(JobCost { seconds: pixels * (samples + 1.0), pixels, samples }, &mut share);
         }
@@ -123,11 +123,11 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_without_pixels_tells_nothing() {
+    fn cell_without_pixels_has_unknown_cost() {
         let (mut share, mut cell) = (PixelShare::default(), CellCost::default());
         cell.note(JobCost { seconds: 1e-6, pixels: 1.0, samples: 1.0 }, &mut share);
         assert!(!cell.is_unknown());
-        // A half without pixels gets jobs too.
+        // Halves without pixels get jobs as well.
         for _ in 0..2000 {
             cell.note(JobCost { seconds: 1e-9, pixels: 0.0, samples: 32.0 }, &mut share);
         }

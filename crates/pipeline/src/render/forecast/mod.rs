@@ -1,82 +1,82 @@
-//! The forecast of a render: how far is it, when is it done, and how much noise will be left?
+//! Forecast of a render: progress, remaining time and final noise.
 //!
-//! The door to all predictions. They are shown and decide nothing: where samples go is decided by
-//! [`noise_goals`](super::noise_goals) and [`time_budget`](super::time_budget), on which the picture depends.
+//! All predictions of a render. They are only displayed: [`noise_goals`](super::noise_goals) and
+//! [`time_budget`](super::time_budget) decide which samples are rendered, and only those affect the image.
 //!
 //! | file | predicts |
 //! | --- | --- |
-//! | [`samples`] | the samples that each part of the picture will need for the error asked for |
-//! | [`cost`] | the processor time of these samples |
-//! | [`pace`] | the time that this takes, by the rate so far |
-//! | [`noise`] | the noise by then |
+//! | [`samples`] | the samples that each part of the image needs to reach the noise target |
+//! | [`cost`] | the CPU time of these samples |
+//! | [`work_rate`] | the remaining time, from the rate so far |
+//! | [`noise`] | the noise after that time |
 
 pub(crate) mod cost;
 mod noise;
-mod pace;
 pub(crate) mod samples;
+mod work_rate;
 
 use std::time::Instant;
 
 use rayon::ThreadPool;
 
 use self::noise::NoiseForecast;
-use self::pace::{Pace, Work};
+use self::work_rate::{Work, WorkRate};
 use super::film_state::FilmState;
 use crate::film::Convergence;
 use crate::plan::Plan;
 use crate::protocol::RenderProgress;
 use crate::scene::description::Render;
 use crate::stages::photons::PhotonStore;
-use crate::trace::jobs_to_come;
+use crate::trace::remaining_jobs;
 
-/// To add up the work to come takes at most one part in so many of the time: it is a sum over all cells.
+/// Adding up the remaining work may take at most `1/EXPECTATION_SHARE` of the time, because it is a sum over all cells.
 const EXPECTATION_SHARE: u32 = 100;
 
-/// The work to come, as it was added up last.
+/// The last computed amount of total work.
 struct Expectation {
-    /// Time at which the work is added up again.
+    /// Time of the next computation.
     due: Instant,
-    /// Processor time of the whole render, in seconds. `None` while nobody knows where the render ends.
+    /// CPU seconds of the whole render. `None` while its end is unknown.
     total: Option<f64>,
-    /// Passes of photons, now and in the end.
+    /// Photon passes so far and in total.
     passes: [u32; 2],
 }
 
-/// Progress of one render, and its end as far as it is known.
+/// Progress and forecast of a render.
 pub(crate) struct Forecast {
-    pace: Pace,
+    rate: WorkRate,
     noise: NoiseForecast,
     expectation: Expectation,
-    /// The fraction that was reported last.
+    /// Last reported fraction.
     fraction: f64,
-    /// Pixels times samples in the end.
+    /// Expected pixels times samples in total.
     total_units: u64,
-    /// Seconds in which photons were sent.
+    /// Seconds spent on photons.
     photon_seconds: f64,
-    /// Time at which the photons under way began to be sent. `None` while none are.
+    /// Time at which the current photon pass began. `None` outside of a pass.
     photons_since: Option<f64>,
 }
 
-/// A moment of a render.
+/// State of a render at some time.
 pub(crate) struct Moment<'a> {
     pub(crate) state: &'a FilmState,
     pub(crate) plan: &'a Plan,
     pub(crate) photons: Option<&'a PhotonStore>,
-    /// Seconds since the stage began, without pauses.
+    /// Seconds since the render stage began, without pauses.
     pub(crate) elapsed_seconds: f64,
     /// Pixels times samples so far.
     pub(crate) units: u64,
-    /// Whether some pixels have no sample yet.
+    /// Whether some pixels have no sample.
     pub(crate) is_first: bool,
     /// Whether the render is over.
     pub(crate) is_last: bool,
 }
 
 impl Forecast {
-    /// Forecast of a render to at most so many samples per pixel.
+    /// Creates the forecast of a render with at most `most` samples per pixel.
     pub(crate) fn new(state: &FilmState, most: u32) -> Self {
         Self {
-            pace: Pace::new(state.seconds()),
+            rate: WorkRate::new(state.seconds()),
             noise: NoiseForecast::new(),
             expectation: Expectation { due: Instant::now(), total: None, passes: [0; 2] },
             fraction: 0.0,
@@ -86,44 +86,43 @@ impl Forecast {
         }
     }
 
-    /// Adds up the work to come anew: goals have changed.
+    /// Recomputes the total work after goals have changed.
     pub(crate) fn expect_again(&mut self, state: &FilmState, most: u32) {
         self.total_units = state.units_to_come(most);
         self.expectation.due = Instant::now();
     }
 
-    /// Photons are being sent from now on; `seconds` of the stage's clock.
+    /// Begins a photon pass. `seconds` is the stage's time.
     pub(crate) fn begin_photons(&mut self, seconds: f64) {
         self.photons_since = Some(seconds);
     }
 
-    /// The photons have been sent.
+    /// Ends a photon pass.
     pub(crate) fn end_photons(&mut self, seconds: f64) {
         if let Some(since) = self.photons_since.take() {
             self.photon_seconds += seconds - since;
         }
     }
 
-    /// Measures the noise of the film, if it is time for that.
-    /// `seconds` of the stage's clock.
+    /// Measures the noise of the film if a measurement is due. `seconds` is the stage's time.
     pub(crate) fn look_at_noise(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
         let least = state.samples(u32::MAX);
         pool.install(|| self.noise.look(&state.film, least, (state.seconds(), seconds)));
     }
 
-    /// Progress at a moment, with the time and the noise that are expected.
+    /// Returns the progress, with the predicted time and noise.
     pub(crate) fn progress(&mut self, moment: &Moment<'_>) -> RenderProgress {
         let elapsed_seconds = moment.elapsed_seconds;
-        // Predict the end from the work alone.
+        // Predict the end from the work.
         let work = self.work(moment);
-        let (mut fraction, mut eta_seconds) = self.pace.at(elapsed_seconds, work);
-        // End with the budget of time, if that is sooner.
+        let (mut fraction, mut eta_seconds) = self.rate.at(elapsed_seconds, work);
+        // Apply the time limit if it ends the render earlier.
         if let Some(budget) = moment.plan.time_seconds {
-            // The first pass is finished whatever the budget is.
+            // The first pass is finished even if the time is up.
             let of_first = eta_seconds.map_or(0.0, |eta| eta * self.share_of_first(moment));
             let left = (budget - elapsed_seconds).max(of_first);
             eta_seconds = Some(eta_seconds.unwrap_or(left).min(left));
-            // Time passes even where work stands still.
+            // Time passes even if no work is done.
             fraction = fraction.max(elapsed_seconds / (elapsed_seconds + left)).min(1.0);
         }
         self.fraction = if moment.is_last { 1.0 } else { self.fraction.max(fraction) };
@@ -138,11 +137,11 @@ impl Forecast {
             mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
             is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
-            noise: self.noise.at(work, self.pace.rate(), left),
+            noise: self.noise.at(work, self.rate.rate(), left),
         }
     }
 
-    /// Work so far and in all. Where noise ends the render, nobody knows the end before the noise was judged.
+    /// Returns the work so far and in total. If noise ends the render, the total is unknown until the noise is judged.
     fn work(&mut self, moment: &Moment<'_>) -> Work {
         if Instant::now() >= self.expectation.due {
             self.expectation = expectation(moment);
@@ -159,7 +158,7 @@ impl Forecast {
         }
     }
 
-    /// The first pass's part of the work that is left.
+    /// Returns the first pass's share of the remaining work.
     fn share_of_first(&self, moment: &Moment<'_>) -> f64 {
         if !moment.is_first {
             return 0.0;
@@ -170,8 +169,8 @@ impl Forecast {
     }
 }
 
-/// Whether noise is known to fall as it did. With `error`, fewer and fewer tiles get samples; the first passes of photons tell
-/// little of later ones, whose radius is smaller.
+/// Whether future noise follows from past noise. With `error`, fewer and fewer tiles get samples. With photons, later
+/// passes have smaller radii than the first.
 fn falls_evenly(moment: &Moment<'_>) -> bool {
     match moment.state.film.convergence() {
         Convergence::Stratified => !(moment.plan.settings.render.error > 0.0),
@@ -179,7 +178,7 @@ fn falls_evenly(moment: &Moment<'_>) -> bool {
     }
 }
 
-/// Adds up the work to come over all cells.
+/// Adds up the work of all cells.
 fn expectation(moment: &Moment<'_>) -> Expectation {
     let Moment { state, plan, photons, .. } = moment;
     let Render { samples: most, error, .. } = plan.settings.render;
@@ -187,7 +186,7 @@ fn expectation(moment: &Moment<'_>) -> Expectation {
     let is_known = !(error > 0.0) || state.is_foreseen();
     let pixels = state.film.crop().area();
     let at_once = photons.map_or(u32::MAX, PhotonStore::at_once);
-    let jobs = |done, end| jobs_to_come(done, end, pixels, at_once);
+    let jobs = |done, end| remaining_jobs(done, end, pixels, at_once);
     let total = is_known.then(|| state.seconds() + state.seconds_to_come(most, jobs));
     let passes = photons.map_or([0; 2], |_| state.passes(most));
     Expectation { due: Instant::now() + EXPECTATION_SHARE * begin.elapsed(), total, passes }

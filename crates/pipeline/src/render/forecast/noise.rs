@@ -1,31 +1,31 @@
-//! Noise of the render now, and how fast it falls.
+//! Measured noise of a render and its predicted decrease.
 
 use std::time::{Duration, Instant};
 
-use super::pace::Work;
+use super::work_rate::Work;
 use crate::film::{Film, ImageNoise};
 use crate::protocol::NoiseProgress;
 use crate::render::noise_goals::LEAST;
 
-/// Shortest time between two measurements, and before the first: each is a sum over all pixels.
+/// Minimum time before the first and between two measurements, each of which is a sum over all pixels.
 const INTERVAL: Duration = Duration::from_millis(500);
-/// Least ratio of the noise to the next level reported.
+/// Minimum ratio of the current noise to the next reported level.
 const STEP: f64 = 1.5;
 
-/// The last measurement of noise.
+/// The last noise measurement and the time of the next one.
 #[derive(Debug)]
 pub(crate) struct NoiseForecast {
     due: Instant,
     told: Option<Measured>,
 }
 
-/// A measurement of noise.
+/// A noise measurement.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     noise: ImageNoise,
-    /// The work that was done.
+    /// Work done before the measurement.
     done: f64,
-    /// Seconds of the stage.
+    /// Seconds of the stage before the measurement.
     seconds: f64,
 }
 
@@ -34,7 +34,7 @@ impl NoiseForecast {
         Self { due: Instant::now() + INTERVAL, told: None }
     }
 
-    /// Measures again, if it is time: every pixel has at least `samples`, a power of two.
+    /// Measures the noise if a measurement is due. Every pixel has at least `samples` samples, a power of two.
     pub(crate) fn look(&mut self, film: &Film, samples: u32, (done, seconds): (f64, f64)) {
         if samples < LEAST || Instant::now() < self.due {
             return;
@@ -43,11 +43,11 @@ impl NoiseForecast {
         self.due = Instant::now() + INTERVAL;
     }
 
-    /// Noise as it was measured last, and its fall from now on, at `rate` of work a second. `left`: seconds until the end. `None` if
-    /// nobody can tell how noise falls.
+    /// Returns the last measured noise and its predicted decrease, at `rate` work per second, with `left` seconds until
+    /// the end. Returns `None` before the first measurement.
     pub(crate) fn at(&self, work: Work, rate: Option<f64>, left: Option<f64>) -> Option<NoiseProgress> {
         let Measured { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
-        // The part of the noise that so many times the samples leave.
+        // Returns the remaining fraction of the noise after `times` as many samples.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
         let next = rate.zip(left).and_then(|(rate, left)| next_level(by_now, work, rate, power, left));
@@ -55,18 +55,18 @@ impl NoiseForecast {
     }
 }
 
-/// The next round level below the noise that is expected `by_now`, and the seconds until then. `None` if the render ends first:
-/// what is left at its end hangs on all its samples.
+/// Returns the next round level below the expected noise and the seconds until then. Returns `None` if the render ends
+/// before, because the noise at its end depends on all its samples.
 fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Option<(f64, f64)> {
     let Work { done, aside: [aside, _], .. } = work;
     let level = level_below(by_now / STEP);
     let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
-    // What goes on aside takes its part of the time from here on too.
+    // Time spent aside continues at its current share.
     let seconds = more / rate * (1.0 + aside * rate / done);
     (level > 0.0 && seconds <= left).then_some((level, seconds))
 }
 
-/// The largest of 1, 2, 5, 10, … %, up and down, that is not above a number.
+/// Returns the largest of …, 1, 2, 5, 10, … % that is at most `most`.
 fn level_below(most: f64) -> f64 {
     if !(most > 0.0) {
         return 0.0;
@@ -80,28 +80,28 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_round_and_well_below() {
+    fn levels_are_round_and_below() {
         for (most, level) in [(0.02, 0.02), (0.0199, 0.01), (0.07, 0.05), (0.0049, 0.002), (3.0, 2.0)] {
             assert!((level_below(most) / level - 1.0).abs() < 1e-9, "{most}: {}", level_below(most));
         }
         assert_eq!(level_below(0.0), 0.0);
     }
 
-    /// Noise of independent samples, 2.1 % after 100 units of work and 9 seconds.
+    /// Noise of independent samples: 2.1 % after 100 units of work and 9 seconds.
     fn measured() -> NoiseForecast {
         let noise = ImageNoise { relative_error: 0.021, power: 1.0 };
         NoiseForecast { due: Instant::now(), told: Some(Measured { noise, done: 100.0, seconds: 9.0 }) }
     }
 
     #[test]
-    fn the_next_level_comes_when_so_many_samples_are_done() {
-        // 10 units a second: 1 % takes 4.41 times as many.
+    fn next_level_follows_from_the_samples() {
+        // At 10 units per second, 1 % takes 4.41 times as many samples.
         let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
         let told = measured().at(work, Some(10.0), Some(100.0)).expect("noise");
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
-        // As much time goes by aside as at work.
+        // Time aside equals the time at work.
         let half = Work { aside: [10.0, 10.0], ..work };
         let (_, seconds) =
             measured().at(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
@@ -109,17 +109,17 @@ mod tests {
     }
 
     #[test]
-    fn what_was_measured_stays_until_it_is_measured_again_and_its_fall_counts() {
+    fn prediction_starts_from_the_current_work() {
         let work = Work { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
         let told = measured().at(work, Some(10.0), Some(1000.0)).expect("noise");
         assert_eq!(told.now, 0.021);
-        // 1.05 % is expected by now: half a percent takes 4.41 times as many.
+        // The expected noise by now is 1.05 %: 0.5 % takes 4.41 times as many samples.
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.005).abs() < 1e-12 && (seconds - 136.4).abs() < 1e-6, "{level} {seconds}");
     }
 
     #[test]
-    fn nothing_is_foretold_for_a_time_after_the_end() {
+    fn no_level_is_predicted_beyond_the_end() {
         let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
         for left in [Some(10.0), Some(34.0), None] {
             assert_eq!(measured().at(work, Some(10.0), left).expect("noise").next, None, "{left:?}");

@@ -1,39 +1,39 @@
-//! The samples that each part of the picture will need for the error asked for, before its goal is decided.
+//! Expected samples of each part of the image to reach the noise target, before its goal is decided.
 
 use crate::film::{CELLS, Convergence, samples_to_reduce_error};
 use crate::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
 
-/// Fall of the variance from two to four samples and from four to eight, if nothing is known. In the bundled scenes half of the
-/// tiles fall faster, half slower.
+/// Assumed decrease of the variance from two to four samples and from four to eight. In the bundled scenes half of the
+/// tiles decrease faster, half slower.
 const EARLY_FALL: f64 = 4.0;
-/// Between which it is believed.
+/// Bounds of a measured decrease.
 const FALLS: [f64; 2] = [2.0, 8.0];
 
-/// Samples that the halves of each cell are expected to get.
+/// Expected samples of both halves of each cell.
 #[derive(Debug)]
 pub(crate) struct ExpectedSamples(Vec<[u32; 2]>);
 
 impl ExpectedSamples {
-    /// For so many cells, of which nothing is known.
+    /// Creates unknown values for this many cells.
     pub(crate) fn unknown(cells: usize) -> Self {
         Self(vec![[u32::MAX; 2]; cells])
     }
 
-    /// Samples that a half of a cell without a goal is expected to get; [`u32::MAX`] where nothing is known.
+    /// Returns the expected samples of a half without a goal, or [`u32::MAX`] if unknown.
     pub(crate) fn of(&self, cell: usize, half: usize) -> u32 {
         self.0[cell][half]
     }
 
-    /// Bytes of all of them.
+    /// Memory size in bytes.
     pub(crate) fn memory_bytes(&self) -> usize {
         size_of_val(self.0.as_slice())
     }
 
-    /// Predicts from a judgement, whose samples are a power of two: by the noise of both halves of a tile, and by its fall.
-    /// `done` are the samples of all halves. Halves with a goal keep their prediction.
+    /// Predicts samples from a judgement, whose samples are a power of two: from the noise of both halves of a tile and
+    /// its decrease. `done` is the number of samples of each half. Halves with a goal keep their prediction.
     pub(crate) fn predict(&mut self, judgement: &Judgement, goals: &Goals, done: &[[u32; 2]]) {
         let Judgement { noise, samples, aim } = judgement;
-        // Take the tiles without goals, and how fast the noise of all of them falls.
+        // Collect the tiles without goals, and how fast the noise of all of them decreases.
         let open = |(tile, noise): (usize, &Option<TileNoise>)| {
             noise.filter(|_| goals.is_open(tile, done, *samples)).map(|noise| (tile, noise))
         };
@@ -50,7 +50,7 @@ impl ExpectedSamples {
             if !mean.is_finite() {
                 continue;
             }
-            // Follow its fall down to the error asked for.
+            // Extrapolate its decrease to the noise target.
             let wanted = law.samples_to(AIM * aim.error, mean.sqrt(), fall);
             let cells = self.0.iter_mut().zip(done).enumerate().skip(CELLS * tile).take(CELLS);
             for (cell, (expected, done)) in cells {
@@ -62,22 +62,22 @@ impl ExpectedSamples {
     }
 }
 
-/// Expected fall of noise from some samples on. Smooth parts fall fast and are below any bound soon. The rest falls as noise at
-/// edges and in penumbras does, or slower.
+/// Expected decrease of noise. Smooth parts converge fast and are soon below any bound. The rest decreases like noise
+/// at edges and in penumbras, or more slowly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct NoiseFall {
     samples: u32,
-    /// Doublings of these by each of which the variance falls by `fall`; after them it falls with `power`.
+    /// Number of doublings at which the variance decreases by `fall`. Afterwards it decreases with `power`.
     doublings: u32,
-    /// Ratio of the tiles' variances before and after the last doubling. `None` below [`LEAST`] samples, where each tile's own
-    /// fall counts.
+    /// Ratio of the tiles' variances before and after the last doubling. `None` below [`LEAST`] samples, where each
+    /// tile uses its own ratio.
     fall: Option<f64>,
-    /// The power of the samples with which variance falls later.
+    /// Exponent of the samples with which the variance decreases later.
     power: f64,
 }
 
 impl NoiseFall {
-    /// The law that fits the tiles' ratios of variance before and after their last doubling.
+    /// Fits the law to the tiles' ratios of variance before and after their last doubling.
     fn of(convergence: Convergence, mut falls: Vec<f64>, samples: u32) -> Self {
         let doublings = (LEAST.ilog2().saturating_sub(samples.ilog2())).max(1);
         if convergence == Convergence::Photons {
@@ -97,10 +97,11 @@ impl NoiseFall {
         Self { samples, doublings, fall: Some(fall), power: libm::log2(fall).min(convergence.usual_power()) }
     }
 
-    /// Samples that bring the noise of a tile to a bound, where its variance fell so by its last doubling.
+    /// Returns the samples at which the noise of a tile reaches `bound`. `fall` is its ratio of variances at the last
+    /// doubling.
     fn samples_to(&self, bound: f64, noise: f64, fall: Option<f64>) -> u32 {
         let of_tile = || {
-            // Of the falls from two samples on, one more is known by each doubling.
+            // Each doubling after two samples reveals one more of the tile's ratios.
             let known = fall.map_or(0.0, |_| 1.0 - 1.0 / f64::from(self.samples.ilog2()));
             let fall = fall.map_or(EARLY_FALL, |fall| fall.clamp(FALLS[0], FALLS[1]));
             libm::pow(fall, known) * libm::pow(EARLY_FALL, 1.0 - known)
@@ -130,17 +131,18 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_both_halves_tells_how_many_samples_there_will_be() {
-        // The first half is smooth, the other one is not.
+    fn noise_of_both_halves_predicts_samples() {
+        // The first half is smooth, the second is not.
         let (goals, expected) = judged([(1.0, 0.0), (1.0, 1.0)], 16, 0.01);
         assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
         assert!((64..1000).contains(&expected.of(0, 0)), "{}", expected.of(0, 0));
     }
 
     #[test]
-    fn a_few_samples_tell_how_many_there_will_be() {
-        // Independent samples of a standard deviation of √(1/12) take 833. Two of them do not tell that their noise falls slowly, each
-        // doubling tells more of it: 80, 190 and 260 by steps of the size to be expected, which 64 pixels tell to about a fifth.
+    fn few_samples_predict_the_total() {
+        // Independent samples with a standard deviation of √(1/12) take 833. Two samples do not reveal that the noise
+        // decreases slowly, and each doubling reveals more. The expected predictions are 80, 190 and 260; 64 pixels
+        // give them to about a fifth.
         for (samples, expected) in [(2, 80.0), (4, 190.0), (8, 260.0)] {
             let (goals, expected_samples) = judged([(1.0, 1.0); 2], samples, 0.01);
             assert_eq!(goals.of(0, 0), u32::MAX, "nothing is decided");
@@ -150,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn how_noise_fell_of_late_tells_how_it_will_fall() {
+    fn recent_decrease_predicts_future_decrease() {
         let (stratified, usual) = (Convergence::Stratified, Convergence::Stratified.usual_power());
         let of = |falls: &[f64]| NoiseFall::of(stratified, falls.to_vec(), 64);
         for (falls, fall, power) in [
@@ -165,7 +167,8 @@ mod tests {
                 "{falls:?}"
             );
         }
-        // Half of the noise of 64 samples, which falls by 4 and then by 2.7 at each doubling; which is nothing but that of chance.
+        // Half of the noise of 64 samples, whose variance decreases by 4 and then by 2.7 per doubling, or like
+        // independent samples.
         let near = |samples: u32, of: f64| (f64::from(samples) / of - 1.0).abs() < 0.02;
         assert!(near(of(&[4.0]).samples_to(0.5, 1.0, None), 128.0));
         assert!(near(of(&[4.0]).samples_to(0.25, 1.0, None), 128.0 * libm::pow(4.0, 1.0 / usual)));
@@ -177,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_takes_more_samples_than_can_be_counted_is_not_taken_for_unknown() {
+    fn huge_predictions_are_not_unknown() {
         for samples in [2, 16, 64] {
             let (goals, expected) = judged([(1.0, 1.0); 2], samples, 1e-12);
             assert_eq!((goals.of(0, 0), expected.of(0, 0)), (u32::MAX, MOST), "{samples}");
@@ -185,13 +188,13 @@ mod tests {
     }
 
     #[test]
-    fn a_few_samples_of_what_is_smooth_tell_that_the_least_will_do() {
-        let way = NoiseFall::of(Convergence::Stratified, vec![], 4);
-        assert_eq!((way.doublings, way.fall), (2, None));
+    fn smooth_tiles_need_few_samples() {
+        let law = NoiseFall::of(Convergence::Stratified, vec![], 4);
+        assert_eq!((law.doublings, law.fall), (2, None));
         let [smooth, unknown, rough] =
-            [Some(8.0), None, Some(1.0)].map(|fall| way.samples_to(0.2, 1.0, fall));
+            [Some(8.0), None, Some(1.0)].map(|fall| law.samples_to(0.2, 1.0, fall));
         assert!(smooth < unknown && unknown < rough, "{smooth} {unknown} {rough}");
-        // Falls of √(8 · 4) and √(2 · 4).
+        // Decreases of √(8 · 4) and √(2 · 4).
         assert!((12..17).contains(&smooth) && (30..55).contains(&rough), "{smooth} {rough}");
     }
 }

@@ -1,24 +1,24 @@
-//! Checkpoints that this process has met: the one that it holds, and the last one that a person has heard of.
+//! Locking of checkpoint files, and which checkpoints have been reported.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use crate::output::FileIdentity;
 
-/// Checkpoints that a process has met, whatever the request.
+/// Checkpoint state of a process across requests.
 #[derive(Debug, Default)]
-pub(crate) struct Claim {
-    /// The checkpoint that it wrote or went on from. It stays open and locked, so that other processes notice it, and so that no other
-    /// file gets its identity.
+pub(crate) struct CheckpointLock {
+    /// The checkpoint that this process wrote or resumed from. It stays open and locked, so that other processes notice
+    /// it and no other file gets its identity.
     held: Option<File>,
-    /// The last one that it wrote, or reported as unused.
+    /// Last checkpoint that was written or reported as unused.
     told: Option<FileIdentity>,
-    /// The request whose failure was reported: each further one of it has the same cause.
+    /// Request whose failure was reported. Further failures of it have the same cause.
     failed: Option<u64>,
 }
 
-impl Claim {
-    /// Holds a file that this process has written, which is locked.
+impl CheckpointLock {
+    /// Holds a file that this process has written and locked.
     pub(super) fn hold(&mut self, path: &Path, file: Option<File>) {
         (self.held, self.told) = (file, FileIdentity::of(path));
     }
@@ -28,34 +28,34 @@ impl Claim {
         let Some(file) = open(path) else { return };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {}
-            // Without locks, the identity tells as well whether it is the same file.
+            // Without locks, the identity is enough to recognize the file.
             Ok(()) | Err(TryLockError::Error(_)) => self.hold(path, Some(file)),
         }
     }
 
-    /// Holds nothing any more.
+    /// Releases the file.
     pub(super) fn release(&mut self) {
         self.held = None;
     }
 
-    /// Whether the file of this path is the one that it holds.
+    /// Whether the file at this path is the held one.
     pub(super) fn holds(&self, path: &Path) -> bool {
         let is_held = |identity: FileIdentity| self.held.as_ref().is_some_and(|file| identity.is_of(file));
         FileIdentity::of(path).is_some_and(is_held)
     }
 
-    /// Whether another process, which is still there, holds the file of this path.
+    /// Whether another running process holds the file at this path.
     pub(super) fn is_of_another(&self, path: &Path) -> bool {
         let is_locked = |file: File| matches!(file.try_lock(), Err(TryLockError::WouldBlock));
         !self.holds(path) && open(path).is_some_and(is_locked)
     }
 
-    /// Whether a failure is the first one of a request; from now on, there was one.
+    /// Records a failure and returns whether it is the first of a request.
     pub(super) fn is_first_failure(&mut self, request: u64) -> bool {
         self.failed.replace(request) != Some(request)
     }
 
-    /// Whether a person has not heard of this file yet; from now on, they have.
+    /// Records a file as reported and returns whether it was not reported before.
     pub(super) fn is_news(&mut self, path: &Path) -> bool {
         let identity = FileIdentity::of(path);
         let is_news = self.told != identity;
@@ -64,7 +64,7 @@ impl Claim {
     }
 }
 
-/// A regular file. `None` for all else: opening a pipe would wait for its writer.
+/// Opens a regular file. Returns `None` for other files, because opening a pipe would block.
 fn open(path: &Path) -> Option<File> {
     if path.metadata().is_ok_and(|found| found.is_file()) { File::open(path).ok() } else { None }
 }
@@ -74,18 +74,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_held_by_one_process_and_no_other_file_passes_for_it() {
+    fn file_is_held_by_one_process() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");
-        let (mut one, mut other) = (Claim::default(), Claim::default());
+        let (mut one, mut other) = (CheckpointLock::default(), CheckpointLock::default());
         assert!(!one.holds(&path) && !one.is_of_another(&path));
         one.take_over(&path);
         assert!(one.holds(&path) && !one.is_of_another(&path));
-        // Another claim stands for another process: a lock is that of an open file.
+        // A second instance acts like another process, because locks belong to open files.
         other.take_over(&path);
         assert!(!other.holds(&path) && other.is_of_another(&path));
-        // A new file of the same name.
+        // Replace the file by a new one of the same name.
         std::fs::write(folder.path().join("b"), "second").expect("written");
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");
         assert!(!one.holds(&path) && !other.is_of_another(&path));
@@ -96,16 +96,16 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_news_once() {
+    fn file_is_news_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.checkpoint");
         std::fs::write(&path, "first").expect("written");
-        let mut claim = Claim::default();
-        assert!(claim.is_news(&path) && !claim.is_news(&path));
+        let mut lock = CheckpointLock::default();
+        assert!(lock.is_news(&path) && !lock.is_news(&path));
         std::fs::write(folder.path().join("b"), "second").expect("written");
         std::fs::rename(folder.path().join("b"), &path).expect("renamed");
-        assert!(claim.is_news(&path) && !claim.is_news(&path));
-        claim.hold(&path, None);
-        assert!(!claim.is_news(&path), "it wrote the file itself");
+        assert!(lock.is_news(&path) && !lock.is_news(&path));
+        lock.hold(&path, None);
+        assert!(!lock.is_news(&path), "this process wrote the file");
     }
 }

@@ -1,26 +1,26 @@
-//! State of a render that its film does not hold.
+//! Render state in addition to the film.
 
 use serde::{Deserialize, Serialize};
 
 use crate::integrators::RayCounters;
 use crate::render::film_state::{Before, FilmState};
 
-/// State of a render beside its film.
+/// State of a render that its film does not contain.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct State {
-    /// Samples that the halves of each cell are to have, as far as that is decided.
+    /// Decided samples of both halves of each cell.
     goals: Vec<[u32; 2]>,
-    /// Samples at which each tile was judged last.
+    /// Samples at which each tile was last judged.
     judged: Vec<u32>,
-    /// Brightness that noise is held against.
+    /// Brightness that noise is compared with.
     brightness: Option<f64>,
     /// Rays of each cell.
     cell_rays: Vec<u64>,
-    /// Camera, shadow, reflected, refracted, scattered rays; texture look-ups.
+    /// Camera, shadow, reflected, refracted and scattered rays, and texture lookups.
     rays: [u64; 6],
-    /// Seconds of rendering.
+    /// Render time in seconds.
     pub(super) seconds: f64,
-    /// Seconds of a processor.
+    /// CPU time in seconds.
     processor_seconds: f64,
 }
 
@@ -45,15 +45,15 @@ impl State {
         }
     }
 
-    /// Camera rays that were traced.
+    /// Returns the number of traced camera rays.
     pub(super) fn camera_rays(&self) -> u64 {
         let [camera_rays, ..] = self.rays;
         camera_rays
     }
 
-    /// Whether a render can have left these numbers. Others would overflow sums, or make a render wait for ever.
+    /// Whether a render can produce these numbers. Others would overflow sums or never end the render.
     pub(super) fn is_possible(&self) -> bool {
-        /// Some 30,000 years.
+        /// About 30,000 years.
         const MOST_SECONDS: f64 = 1e12;
         const MOST_RAYS: u64 = 1 << 56;
         let is_time = |seconds: f64| (0.0..=MOST_SECONDS).contains(&seconds);
@@ -66,14 +66,14 @@ impl State {
             && have_rays(&self.cell_rays)
     }
 
-    /// Whether it is of a film of this size.
+    /// Whether the state fits the size of a film.
     pub(super) fn fits(&self, state: &FilmState) -> bool {
         self.goals.len() == state.done.len()
             && self.cell_rays.len() == state.done.len()
             && self.judged.len() == state.film.tile_count()
     }
 
-    /// Puts it into a film's state. `None`, and nothing is changed, if it is of another film.
+    /// Restores the state of a film. Returns `None` and changes nothing if it does not fit.
     pub(super) fn put(self, state: &mut FilmState) -> Option<()> {
         if !self.fits(state) {
             return None;
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_numbers_are_found() {
+    fn impossible_numbers_are_detected() {
         assert!(state().is_possible());
         for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
             assert!(!State { seconds, ..state() }.is_possible(), "{seconds}");

@@ -1,10 +1,10 @@
-//! Clocks that stand still while work is paused.
+//! Clocks that stop while work is paused.
 
 use std::time::{Duration, Instant};
 
 use crate::control::CancelToken;
 
-/// A clock that stands still while work is held.
+/// A clock whose caller reports whether work is paused.
 #[derive(Debug)]
 pub(super) struct Clock {
     last: Instant,
@@ -16,7 +16,7 @@ impl Clock {
         Self { last: Instant::now(), active: Duration::ZERO }
     }
 
-    /// Seconds at work until now; the time since the last call counts unless work was held.
+    /// Returns the seconds of active work. The time since the last call counts unless work was `held`.
     pub(super) fn seconds(&mut self, held: bool) -> f64 {
         let now = Instant::now();
         if !held {
@@ -27,7 +27,7 @@ impl Clock {
     }
 }
 
-/// Seconds since it was started, without those in which work was held.
+/// Seconds since the start without pauses.
 #[derive(Debug)]
 pub(super) struct Stopwatch<'a> {
     begin: Instant,
@@ -51,13 +51,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stopwatch_stands_while_work_is_held() {
+    fn stopwatch_stops_while_work_is_paused() {
         const HOLD: Duration = Duration::from_millis(300);
         let (token, begin) = (CancelToken::new(), Instant::now());
         let watch = Stopwatch::start(&token);
         token.set_paused(true);
         std::thread::sleep(HOLD);
-        // Of all the time that went by, what was held is not in it, however slow the machine is.
+        // However slow the machine is, the pause must not be included.
         let most = || begin.elapsed().saturating_sub(HOLD).as_secs_f64();
         let during = watch.seconds();
         assert!(during <= most(), "{during}");

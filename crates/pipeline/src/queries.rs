@@ -1,11 +1,10 @@
-//! Errands: a question about a place of the current picture, and the orders to write the camera into the scene file and to take
-//! that back. They are carried out whatever else is going on.
+//! Queries about the current image, and edits of the camera in the scene file. They run during and between requests.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::inputs::Inputs;
-use super::protocol::{CameraEdit, Event, Kept, MovedCamera, Picked, Spot, Thing, Viewpoint};
+use super::protocol::{CameraEdit, Event, ImagePosition, Kept, MovedCamera, Picked, Thing, Viewpoint};
 use super::render::film_state::FilmState;
 use super::sink::Sink;
 use super::stages::parse::Parsed;
@@ -13,21 +12,24 @@ use crate::control::CancelToken;
 use crate::film::Quantity;
 use crate::integrators::RenderSettings;
 use crate::math::DVec2;
+use crate::messages::{
+    ALREADY_EXISTS, CAMERA_CHANGED, MODEL_MISSING, NOT_UNDONE, SCENE_FILE_CHANGED, SCENE_FILE_MISSING,
+};
 use crate::output::{Losses, OutputError, write};
 use crate::scene::{Loaded, is_mesh, is_model, text_now};
 use crate::system::{describe_error, file};
 use crate::world::World;
 
-/// An order that a person gives.
+/// A query or edit requested by the user.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Errand {
+pub(super) enum Query {
     KeepCamera(MovedCamera),
     UndoCamera(CameraEdit),
-    Pick(Spot),
+    Pick(ImagePosition),
 }
 
-impl Errand {
-    /// There is nothing to ask.
+impl Query {
+    /// Reports that the query cannot be answered, and why.
     pub(super) fn fail(&self, why: &str, sink: &Sink) {
         let generation = sink.generation;
         match self {
@@ -42,36 +44,36 @@ impl Errand {
     }
 }
 
-/// The picture that somebody looks at.
+/// The current image.
 #[derive(Clone)]
-pub(super) struct AtHand {
+pub(super) struct QueryContext {
     pub(super) parsed: Arc<Parsed>,
-    /// Values that the call sets in the scene.
+    /// Overrides of scene keys.
     pub(super) sets: Vec<String>,
     pub(super) world: Arc<World>,
     pub(super) settings: RenderSettings,
-    /// The scene's own camera.
+    /// Camera of the scene.
     pub(super) own: Viewpoint,
 }
 
-impl AtHand {
-    pub(super) fn run(&self, errand: &Errand, canvas: Option<&FilmState>, inputs: &Inputs, sink: &Sink) {
+impl QueryContext {
+    pub(super) fn run(&self, query: &Query, state: Option<&FilmState>, inputs: &Inputs, sink: &Sink) {
         let generation = sink.generation;
-        sink.send(match errand {
-            Errand::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, canvas)) },
-            Errand::KeepCamera(camera) => {
+        sink.send(match query {
+            Query::Pick(spot) => Event::Picked { generation, picked: Box::new(self.pick(*spot, state)) },
+            Query::KeepCamera(camera) => {
                 Event::CameraKept { generation, outcome: self.keep_camera(camera, inputs) }
             }
-            Errand::UndoCamera(edit) => Event::CameraUndone { generation, outcome: undo(edit, inputs) },
+            Query::UndoCamera(edit) => Event::CameraUndone { generation, outcome: undo(edit, inputs) },
         });
     }
 
-    /// The first object on the ray through the middle of a pixel.
-    fn pick(&self, spot: Spot, canvas: Option<&FilmState>) -> Picked {
+    /// Finds the first object on the ray through the center of a pixel.
+    fn pick(&self, spot: ImagePosition, state: Option<&FilmState>) -> Picked {
         let (width, height) = (self.settings.render.width, self.settings.render.height);
         let pixel = |at: f64, side: u32| ((at * f64::from(side)).max(0.0) as u32).min(side - 1);
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
-        let color = canvas.and_then(|canvas| canvas.film.pixel(Quantity::Radiance, x, y));
+        let color = state.and_then(|state| state.film.pixel(Quantity::Radiance, x, y));
         let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let thing = self.thing(self.settings.pixel_to_camera(middle));
         Picked { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
@@ -86,8 +88,8 @@ impl AtHand {
         let material = match object.material.map(|index| &loaded.scene.materials[index]) {
             Some(material) => format!("{} {}", material.kind.name(), material.name),
             None => match world.file_material_name(&hit) {
-                Some(name) => format!("{name}, of the file"),
-                None => "none of the file".to_owned(),
+                Some(name) => format!("{name} (in the file)"),
+                None => "no material in the file".to_owned(),
             },
         };
         let is_front = surface.shading_normal.dot(ray.direction) <= 0.0;
@@ -105,8 +107,7 @@ impl AtHand {
         })
     }
 
-    /// Writes the scene file with this camera, unless the file, or the camera that it was moved from, is another one than was
-    /// read.
+    /// Writes this camera into the scene file, unless the file or the scene's camera has changed since it was read.
     fn keep_camera(
         &self,
         MovedCamera { camera, own }: &MovedCamera,
@@ -118,27 +119,25 @@ impl AtHand {
             return write_scene_of_model(loaded, camera);
         }
         if is_mesh(&path) && path.symlink_metadata().is_err() {
-            return Err(format!("{} is gone: its scene is not written", path.display()));
+            return Err(format!("{} {MODEL_MISSING}", path.display()));
         }
         let read = loaded.source.text();
-        let changed = "the scene file has changed since it was read: the camera is not written into it";
+        let changed = SCENE_FILE_CHANGED;
         if is_gone(&path) {
-            return Err("the scene file is gone: the camera is not written".to_owned());
+            return Err(SCENE_FILE_MISSING.to_owned());
         }
         if !has_text(&path, read) {
             return Err(changed.to_owned());
         }
-        // Numbers that keys did not move are those of the camera from before: they would go over newer ones.
+        // Values that keys did not change are of the previous camera and would overwrite newer ones.
         if *own != self.own {
-            return Err(
-                "the scene's camera has changed since it was moved: press c again to write it".to_owned()
-            );
+            return Err(CAMERA_CHANGED.to_owned());
         }
         let text = loaded.text_with_camera(camera)?;
         let edit = if text == read {
             None
         } else {
-            replace(&path, (read, &text), inputs, (changed, "the camera is not written into it"))?;
+            replace(&path, (read, &text), inputs, (changed, "camera not saved"))?;
             Some(CameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
@@ -146,32 +145,32 @@ impl AtHand {
     }
 }
 
-/// Puts back the text from before a camera was written, if the file is still as that left it.
+/// Restores the text from before the camera was written, if the file has not changed since.
 fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     let CameraEdit { path, before, after } = edit;
-    let changed = format!("{} has changed since c wrote it: it is left as it is", path.display());
+    let changed = format!("{} {NOT_UNDONE}", path.display());
     if is_gone(path) {
-        return Err(format!("{} is gone: there is nothing to undo in it", path.display()));
+        return Err(format!("{} does not exist: nothing to undo", path.display()));
     }
     if !has_text(path, after) {
         return Err(changed);
     }
-    replace(path, (after, before), inputs, (&changed, "it is left as it is"))?;
+    replace(path, (after, before), inputs, (&changed, "not undone"))?;
     Ok(path.clone())
 }
 
-/// Whether a file has vanished.
+/// Whether a file does not exist.
 fn is_gone(path: &Path) -> bool {
     path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
-/// Whether this is what the file holds.
+/// Whether the file has exactly this text.
 fn has_text(path: &Path, text: &str) -> bool {
     text_now(path).is_ok_and(|now| *now == *text)
 }
 
-/// Writes another text in place of the one that a scene file has. `changed`: the words for a file with any other text.
-/// `outcome`: what does not happen if the file would lose something.
+/// Replaces the text of a scene file. `changed` is the error if the file has another text, `outcome` the result if
+/// metadata of the file would be lost.
 fn replace(
     path: &Path,
     (old, new): (&str, &str),
@@ -194,18 +193,16 @@ fn replace(
         .map_err(|error| error.to_string())
 }
 
-/// Writes the scene of a model, with this camera, beside the model; never over a file.
+/// Writes the scene of a model with this camera next to the model, without replacing a file.
 fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
-        return Err(format!(
-            "{shown} exists already, and is left as it is: move it away, then press c again"
-        ));
+        return Err(format!("{shown} {ALREADY_EXISTS}: move it away and press c again"));
     }
     let text = loaded.text_with_camera(camera)?;
     write::new_file(&path, text.as_bytes())
-        .map_err(|error| format!("{shown} is not written: {}", describe_error(&error)))?;
+        .map_err(|error| format!("cannot write {shown}: {}", describe_error(&error)))?;
     Ok(Kept { path, is_new: true, is_own: false, of_model: true, edit: None })
 }
 
@@ -217,11 +214,11 @@ mod tests {
     use crate::tests::loaded_of;
 
     #[test]
-    fn the_scene_of_a_model_that_cannot_be_written_is_said_to_be_unwritten() {
+    fn unwritable_model_scene_is_reported() {
         let loaded = Loaded { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
         let pose = Pose { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y };
         let camera = Viewpoint { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
         let said = write_scene_of_model(&loaded, &camera).expect_err("no folder");
-        assert_eq!(said, "gone/a.toml is not written: no such file or directory");
+        assert_eq!(said, "cannot write gone/a.toml: no such file or directory");
     }
 }

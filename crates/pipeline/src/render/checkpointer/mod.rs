@@ -1,13 +1,13 @@
-//! Checkpoints of a render: when they are written, what they hold beside the film, and how a render goes on from one.
+//! Saving and restoring of checkpoints of a render.
 
-mod claim;
+mod lock;
 mod state;
 
 use std::cell::{Cell, OnceCell, RefCell};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-pub(crate) use self::claim::Claim;
+pub(crate) use self::lock::CheckpointLock;
 use self::state::State;
 use super::film_state::FilmState;
 use super::share::Share;
@@ -16,6 +16,7 @@ use crate::engine::Interruption;
 use crate::film::Film;
 use crate::inputs::Inputs;
 use crate::integrators::RayCounters;
+use crate::messages;
 use crate::output::part::{
     self, Head, Kind, PartError, PartFile, PictureHead, ShareHead, Trait, differences,
 };
@@ -26,13 +27,13 @@ use crate::settings::{Checkpoints, Resume};
 use crate::sink::Sink;
 use crate::stages::Stop;
 
-/// A checkpoint takes at most one part in so many of the time.
+/// Checkpointing may use at most `1/TIME_SHARE` of the render time.
 const TIME_SHARE: u32 = 100;
 
-/// Ending of a checkpoint's name, behind that of the output.
+/// Extension appended to the output's name.
 const ENDING: &str = ".checkpoint";
 
-/// The head of a film's file.
+/// Creates the head of a part or checkpoint file.
 pub(crate) fn head(kind: Kind, state: &FilmState, identity: Vec<Trait>, finish: &Finish) -> Head {
     let share = share_head(state.share.as_ref());
     Head { kind, identity, share, picture: PictureHead::new(&state.film, finish), scene: String::new() }
@@ -50,45 +51,45 @@ fn share_head(share: Option<&Share>) -> ShareHead {
     }
 }
 
-/// Ending of a checkpoint that made way for that of another render.
+/// Extension appended to the checkpoint of another render that is moved aside.
 const ASIDE: &str = ".before";
 
-/// The file of an output's checkpoint.
+/// Returns the checkpoint path of an output.
 pub(crate) fn path_of(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
     name.push(ENDING);
     name.into()
 }
 
-/// Surroundings of a render with checkpoints.
+/// Context of a render with checkpoints.
 #[derive(Clone, Copy)]
-pub(crate) struct Around<'a> {
+pub(crate) struct CheckpointContext<'a> {
     pub(crate) finish: &'a Finish,
     pub(crate) inputs: &'a Inputs,
     pub(crate) sink: &'a Sink,
-    /// Names of all that the picture depends on; takes a while to find out.
+    /// Computes the names and values of everything that the image depends on. Slow.
     pub(crate) name: &'a dyn Fn() -> Vec<Trait>,
-    /// Why the render is cancelled.
+    /// Returns why the render is interrupted.
     pub(crate) interruption: &'a dyn Fn() -> Interruption,
-    /// Checkpoints that the process has met before.
-    pub(crate) claim: &'a RefCell<Claim>,
+    /// Checkpoint state of the process.
+    pub(crate) lock: &'a RefCell<CheckpointLock>,
 }
 
-/// Checkpoints of one render.
-pub(crate) struct Keeping<'a> {
+/// Saves and restores checkpoints of one render.
+pub(crate) struct Checkpointer<'a> {
     output: PathBuf,
     path: PathBuf,
     settings: Checkpoints,
-    around: Around<'a>,
+    around: CheckpointContext<'a>,
     identity: OnceCell<Vec<Trait>>,
     due: Cell<Instant>,
-    /// Whether the checkpoint that this process holds is of this render.
+    /// Whether the checkpoint held by this process is of this render.
     is_own: Cell<bool>,
 }
 
-impl<'a> Keeping<'a> {
-    /// Checkpoints beside an output.
-    pub(crate) fn new(output: &Path, settings: Checkpoints, around: Around<'a>) -> Self {
+impl<'a> Checkpointer<'a> {
+    /// Creates a checkpointer for an output.
+    pub(crate) fn new(output: &Path, settings: Checkpoints, around: CheckpointContext<'a>) -> Self {
         Self {
             output: output.to_owned(),
             path: path_of(output),
@@ -104,12 +105,12 @@ impl<'a> Keeping<'a> {
         self.identity.get_or_init(self.around.name)
     }
 
-    /// Brings an empty film to where the checkpoint was, if the call asks for that, or to the end, if the output is this part already.
-    /// Returns whether the film is of use: if not, the render begins with another one.
+    /// Restores an empty film from a checkpoint if the settings ask for it, or from the output if that is already this
+    /// part. Returns whether the film is usable; if not, the render must start with a new one.
     ///
     /// # Errors
-    /// The call asks for a checkpoint that is of another picture, damaged, or has more samples than asked for; or for a part where
-    /// that of another render is.
+    /// A requested checkpoint is of another image, damaged, or has more samples than requested; or the output is a part
+    /// of another render.
     pub(crate) fn resume(&self, state: &mut FilmState, samples: u32) -> Result<bool, Stop> {
         let resume = self.settings.resume;
         let is_there = self.path.symlink_metadata().is_ok();
@@ -125,7 +126,7 @@ impl<'a> Keeping<'a> {
             Resume::No | Resume::Asked | Resume::IfSame => {}
         }
         if resume != Resume::Asked && !part::is_part(&self.path) {
-            self.tell_failure(&format!("{}: the file of this name is no checkpoint", self.path.display()));
+            self.tell_failure(&format!("{} {}", self.path.display(), messages::NOT_A_CHECKPOINT));
             return Ok(true);
         }
         if resume == Resume::No {
@@ -136,7 +137,7 @@ impl<'a> Keeping<'a> {
             return Ok(true);
         }
         let Err(error) = self.restore(state, samples) else {
-            self.around.claim.borrow_mut().take_over(&self.path);
+            self.around.lock.borrow_mut().take_over(&self.path);
             self.is_own.set(true);
             let (path, samples) = (self.path.clone(), state.samples(samples));
             self.tell(CheckpointNews::Resumed { path, samples });
@@ -145,16 +146,16 @@ impl<'a> Keeping<'a> {
         if resume == Resume::Asked {
             return Err(Stop::wrong_call(
                 format!("--resume: {error}"),
-                "leave --resume out to start from the beginning, or name another file with -o",
+                "remove --resume to start over, or name another file with -o",
             ));
         }
-        if self.around.claim.borrow_mut().is_news(&self.path) {
+        if self.around.lock.borrow_mut().is_news(&self.path) {
             self.tell(CheckpointNews::Unused { path: self.path.clone(), why: why(&error) });
         }
         Ok(!state.is_begun())
     }
 
-    /// Takes the samples of a part that is finished already, if the output is one. Returns whether it is.
+    /// Restores the film from an output that is this part already. Returns whether it is.
     ///
     /// # Errors
     /// The output is a part of another render.
@@ -165,7 +166,7 @@ impl<'a> Keeping<'a> {
         let path = self.output.clone();
         let file = match PartFile::open(&self.output, &CancelToken::new()) {
             Ok(file) if file.head.kind == Kind::Part => file,
-            // Checked before the work: no part replaces a checkpoint.
+            // Targets were checked before: a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
                 self.tell(CheckpointNews::Unused { path, why: why(&error) });
@@ -175,11 +176,11 @@ impl<'a> Keeping<'a> {
         let mut differences = self.unlike(&file.head, state);
         let head = Head { scene: file.head.scene.clone(), ..self.head(Kind::Part, state) };
         if differences.is_empty() && file.head != head {
-            differences.push("the picture is finished in another way".to_owned());
+            differences.push("the output settings differ".to_owned());
         }
         let refused = |error: PartError| {
-            let way_out = "leave --resume out to replace it, or name another file with -o";
-            Err(Stop::wrong_call(format!("--resume: {error}"), way_out))
+            let remedy = messages::REMOVE_RESUME;
+            Err(Stop::wrong_call(format!("--resume: {error}"), remedy))
         };
         if !differences.is_empty() {
             return refused(PartError::Other { path, other: "this call".to_owned(), differences });
@@ -193,17 +194,17 @@ impl<'a> Keeping<'a> {
         Ok(true)
     }
 
-    /// Moves the checkpoint of another render out of the way, unless this one has all that it has. Of several, the one that took
-    /// longest stays aside.
+    /// Moves the checkpoint of another render aside, unless this render includes it. If several are moved aside, the
+    /// one with the longest render time is kept.
     ///
     /// # Errors
-    /// It cannot be moved, or another process holds it: the reason.
+    /// Why it cannot be moved. Another process may hold it.
     fn make_way(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
-        let is_held = self.around.claim.borrow().holds(&self.path);
+        let is_held = self.around.lock.borrow().holds(&self.path);
         if is_held && self.is_own.get() {
             return Ok(());
         }
-        if self.around.claim.borrow().is_of_another(&self.path) {
+        if self.around.lock.borrow().is_of_another(&self.path) {
             return Err(held_by_another(&self.path));
         }
         let Some((head, there)) = kept_in(&self.path) else {
@@ -233,10 +234,10 @@ impl<'a> Keeping<'a> {
         self.move_aside(is_longer)
     }
 
-    /// Moves the checkpoint aside, unless `is_longer` prefers the one that is there.
+    /// Moves the checkpoint aside, unless `is_longer` prefers the one already there.
     ///
     /// # Errors
-    /// It cannot be moved: the reason.
+    /// Why it cannot be moved.
     fn move_aside(&self, is_longer: impl Fn(&Path) -> bool) -> Result<(), String> {
         let mut aside = self.path.as_os_str().to_owned();
         aside.push(ASIDE);
@@ -245,14 +246,17 @@ impl<'a> Keeping<'a> {
             return Ok(());
         }
         if aside.symlink_metadata().is_ok() && kept_in(&aside).is_none() {
-            return Err(format!("{} is in the way of the one that was there", aside.display()));
+            return Err(format!(
+                "cannot move the existing checkpoint aside: {} exists and is not a checkpoint",
+                aside.display()
+            ));
         }
         std::fs::rename(&self.path, &aside).map_err(|error| format!("{}: {error}", self.path.display()))?;
         self.tell(CheckpointNews::SetAside { path: aside });
         Ok(())
     }
 
-    /// Whether a checkpoint is of this picture, and this render has traced as much as it has.
+    /// Whether a checkpoint is of this image and this render has traced at least as much.
     fn has_all_of(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
         let has_rays = state.is_finished_part || there.camera_rays() <= rays.camera_rays;
         self.unlike(head, state).is_empty() && has_rays
@@ -268,21 +272,21 @@ impl<'a> Keeping<'a> {
         }
         let file = PartFile::open(&self.path, &CancelToken::new())?;
         file.check_kind(Kind::Checkpoint)?;
-        // Nothing is changed before all of the file has been looked at.
+        // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
         let read: State =
-            serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state makes no sense"))?;
+            serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state is invalid"))?;
         if !read.is_possible() {
             return Err(damaged("its state has impossible numbers"));
         }
         if !read.fits(state) {
-            return Err(damaged("its state is that of another film"));
+            return Err(damaged("its state does not fit the film"));
         }
         file.restore(&state.film)?;
-        read.put(state).ok_or_else(|| damaged("its state is that of another film"))?;
+        read.put(state).ok_or_else(|| damaged("its state does not fit the film"))?;
         state.count_again();
         if !state.has_at_most(samples) {
-            return Err(other(vec![format!("it has more samples than the {samples} that are asked for")]));
+            return Err(other(vec![messages::has_more_samples(samples)]));
         }
         Ok(())
     }
@@ -291,21 +295,21 @@ impl<'a> Keeping<'a> {
         head(kind, state, self.identity().to_vec(), self.around.finish)
     }
 
-    /// Differences between a head and this render.
+    /// Returns the differences between a head and this render.
     fn unlike(&self, head: &Head, state: &FilmState) -> Vec<String> {
         let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
         let share = share_head(state.share.as_ref());
         let name = |share: &ShareHead| match share.count {
-            1 => "the whole picture".to_owned(),
+            1 => "the whole image".to_owned(),
             count => format!("part {}/{count}", share.index),
         };
         if unlike.is_empty() && head.share != share {
-            unlike.push(format!("it is of {} and this call of {}", name(&head.share), name(&share)));
+            unlike.push(format!("it contains {}, and this run renders {}", name(&head.share), name(&share)));
         }
         unlike
     }
 
-    /// Writes a checkpoint if it is time for one.
+    /// Saves a checkpoint if one is due.
     pub(crate) fn tick(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
         if Instant::now() < self.due.get() {
             return;
@@ -316,28 +320,28 @@ impl<'a> Keeping<'a> {
         self.due.set(Instant::now() + pause);
     }
 
-    /// Writes the checkpoint of a cancelled render that is to be continued later. Returns whether it was written.
+    /// Saves a checkpoint of a cancelled render that will be resumed later. Returns whether it was saved.
     pub(crate) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
         let is_kept = match (self.around.interruption)() {
             Interruption::Replaced => false,
-            // A checkpoint that is there already is to have all that there is.
+            // Update an existing checkpoint even after a short time.
             Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
             Interruption::Ended => true,
         };
-        // Whoever ended it waits: the disk may take longer than that.
+        // Do not wait for the disk, because the process is being terminated.
         is_kept && state.is_begun() && self.write(state, rays, seconds, Durability::Process)
     }
 
-    /// Takes a checkpoint that this process wrote for an earlier request of this render as its own.
+    /// Recognizes a checkpoint that this process saved for an earlier request of this render.
     pub(crate) fn recognize(&self, state: &FilmState) {
-        let is_held = self.around.claim.borrow().holds(&self.path);
+        let is_held = self.around.lock.borrow().holds(&self.path);
         let is_own =
             is_held && PartFile::head(&self.path).is_ok_and(|head| self.unlike(&head, state).is_empty());
         self.is_own.set(is_own);
     }
 
-    /// Removes the checkpoint of a picture that is written, or writes a last one if checkpoints are kept. If a long render's picture
-    /// could not be written, or whoever ended the process did not wait for it, its samples are kept all the same.
+    /// Removes the checkpoint of a written image, or saves a last one if checkpoints are kept. If a long render's image
+    /// was not written, or the process is being terminated, its samples are saved as well.
     pub(crate) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
         let is_ended = match (self.around.interruption)() {
@@ -353,20 +357,20 @@ impl<'a> Keeping<'a> {
             }
             (true, false) => {}
         }
-        // One of another picture, of more samples, or of a process that is still there is somebody else's.
+        // Keep a checkpoint of another image, with more samples, or of another running process.
         let is_done = |(head, there)| self.has_all_of(&head, &there, state, rays);
-        let mut claim = self.around.claim.borrow_mut();
-        let is_own = self.is_own.get() && claim.holds(&self.path);
-        if is_own || !claim.is_of_another(&self.path) && kept_in(&self.path).is_some_and(is_done) {
-            claim.release();
-            // What cannot be removed is in nobody's way.
+        let mut lock = self.around.lock.borrow_mut();
+        let is_own = self.is_own.get() && lock.holds(&self.path);
+        if is_own || !lock.is_of_another(&self.path) && kept_in(&self.path).is_some_and(is_done) {
+            lock.release();
+            // A checkpoint that cannot be removed does no harm.
             let _ = std::fs::remove_file(&self.path);
         }
     }
 
-    /// Returns whether the checkpoint was written.
+    /// Saves a checkpoint and returns whether that succeeded.
     fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) -> bool {
-        // 0 is never.
+        // 0 disables checkpoints.
         if self.settings.seconds <= 0.0 {
             return false;
         }
@@ -388,7 +392,7 @@ impl<'a> Keeping<'a> {
         written.is_ok()
     }
 
-    /// Writes a checkpoint and holds it; never over something else.
+    /// Saves a checkpoint and holds it. Never replaces other files.
     fn save(
         &self,
         head: &Head,
@@ -396,19 +400,20 @@ impl<'a> Keeping<'a> {
         state: &serde_json::Value,
         durability: Durability,
     ) -> Result<(), OutputError> {
-        let (path, Around { inputs, claim, .. }) = (&self.path, self.around);
+        let (path, CheckpointContext { inputs, lock, .. }) = (&self.path, self.around);
         let may_replace = |at: &Path| {
             let refused = |reason| Err(OutputError::Refused { reason });
             match at.symlink_metadata() {
                 Ok(_) if !part::is_part(at) || inputs.contain(at) => refused(format!(
-                    "cannot write {}: the file of this name is no checkpoint",
-                    path.display()
+                    "cannot write {}: the existing file {}",
+                    path.display(),
+                    messages::NOT_A_CHECKPOINT
                 )),
                 Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == Kind::Part) => {
                     Err(OutputError::Refused { reason: is_finished_part(path) })
                 }
-                // Another process may have come first since the last look.
-                Ok(_) if claim.borrow().is_of_another(at) => refused(held_by_another(path)),
+                // Another process may have taken the file since the last check.
+                Ok(_) if lock.borrow().is_of_another(at) => refused(held_by_another(path)),
                 Ok(_) | Err(_) => Ok(()),
             }
         };
@@ -418,15 +423,15 @@ impl<'a> Keeping<'a> {
             sweep: None,
             losses: Losses::Told(&|_| ()),
         };
-        // Nobody cancels this: it is short, and a signal may be its reason.
+        // This short write is never cancelled, because a signal may be the reason for it.
         let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
-        claim.borrow_mut().hold(path, file);
+        lock.borrow_mut().hold(path, file);
         Ok(())
     }
 
     fn tell_failure(&self, why: &str) {
-        let Around { sink, claim, .. } = self.around;
-        if claim.borrow_mut().is_first_failure(sink.generation) {
+        let CheckpointContext { sink, lock, .. } = self.around;
+        if lock.borrow_mut().is_first_failure(sink.generation) {
             self.tell(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
         }
     }
@@ -441,17 +446,17 @@ fn is_finished_part(path: &Path) -> String {
 }
 
 fn held_by_another(path: &Path) -> String {
-    format!("another glimt that is running keeps {}; name another file with -o", path.display())
+    format!("{} {}; name another file with -o", messages::CHECKPOINT_IN_USE, path.display())
 }
 
-/// The reason why a file is not used, without its name.
+/// Returns why a file is not used, without its name.
 fn why(error: &PartError) -> String {
     match error {
         PartError::Other { differences, .. } => differences.join("; "),
-        PartError::Damaged { why, .. } => format!("it is damaged: {why}"),
-        PartError::Unfinished { bytes, .. } => format!("it ends at byte {bytes}, before its end"),
+        PartError::Damaged { why, .. } => format!("{}: {why}", messages::DAMAGED),
+        PartError::Unfinished { bytes, .. } => format!("truncated at byte {bytes}"),
         PartError::Version { found, known, .. } => {
-            format!("it has version {found} of the format, and this glimt reads version {known}")
+            format!("format version {found}, but this glimt reads version {known}")
         }
         PartError::Unreadable { .. }
         | PartError::Foreign { .. }
@@ -463,7 +468,7 @@ fn why(error: &PartError) -> String {
     }
 }
 
-/// The head and the state of a whole checkpoint.
+/// Reads the head and the state of a valid checkpoint.
 fn kept_in(path: &Path) -> Option<(Head, State)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(Kind::Checkpoint).ok()?;

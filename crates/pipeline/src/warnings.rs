@@ -1,4 +1,4 @@
-//! What a person should know of the settings that hold, each with what asked for it: an option or the scene.
+//! Warnings about the effective settings, each with the option or key that caused it.
 
 use std::path::PathBuf;
 
@@ -6,11 +6,12 @@ use super::plan::MOST_PHOTONS;
 use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
+use crate::messages::{CAUSTICS_MISSING, CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS, caused_by};
 use crate::scene::description::{MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{Loaded, is_model};
 
-/// The setting that a warning comes of.
+/// The setting that causes a warning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cause {
     Integrator,
@@ -20,8 +21,8 @@ enum Cause {
     View,
 }
 
-/// The warnings of a scene by the settings that hold, `overrides` among them.
-pub(super) fn cautions(
+/// Returns the warnings about the effective settings of a scene, which include `overrides`.
+pub(super) fn settings_warnings(
     loaded: &Loaded,
     scene: &Scene,
     settings: &RenderSettings,
@@ -31,16 +32,16 @@ pub(super) fn cautions(
     found(scene, settings).into_iter().map(place).collect()
 }
 
-/// Where the setting gets its value.
+/// Adds the location of the setting that causes a warning.
 fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
     let severity = Severity::Warning;
     if let Some(option) = cause.option(overrides) {
-        let help = Some(format!("this comes of the setting `{option}`, not of the scene"));
+        let help = Some(caused_by(&option));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
     if cause == Cause::Clamp && is_model(&loaded.path) {
-        let message = format!("the light that its polished surfaces throw on others is cut: {message}");
-        let help = Some("--clamp 0 shows all of it, with bright dots until many samples".to_owned());
+        let message = message.replace(CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS);
+        let help = Some("`--clamp 0` turns it off".to_owned());
         return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };
     }
     match cause.key().and_then(|(table, key)| loaded.setting(table, key)) {
@@ -50,7 +51,7 @@ fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides)
 }
 
 impl Cause {
-    /// As it is typed, where it overrides the scene.
+    /// Returns the command line option, if it overrides the scene.
     fn option(self, overrides: &Overrides) -> Option<String> {
         match self {
             Self::Integrator => overrides.integrator.map(|one| format!("--integrator {}", one.name())),
@@ -63,7 +64,7 @@ impl Cause {
         }
     }
 
-    /// Table and key in a scene.
+    /// Returns the table and key in the scene.
     fn key(self) -> Option<(&'static str, &'static str)> {
         match self {
             Self::Integrator => Some(("render", "integrator")),
@@ -79,7 +80,7 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let RenderSettings { render, photons, .. } = &settings.effective();
     let finds_all_light = render.integrator.method().scatters;
     let is_specular = |kind: &MaterialKind| kind.has_delta();
-    // A ray of a light stops at it, and light that goes straight on has no other way to be found.
+    // Shadow rays end at such surfaces, and light that passes them in a straight line is not found in another way.
     let keeps_direction = |kind: &MaterialKind| kind.has_delta() || kind.is_like_air();
     let has = |is_one: &dyn Fn(&MaterialKind) -> bool| {
         let used = scene.objects.iter().filter_map(|object| object.material);
@@ -88,30 +89,28 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let mut warnings = Vec::new();
     let is_sharp_any = scene.lights.iter().any(|light| light.sends() && light.is_sharp());
     if finds_all_light && is_sharp_any && has(&keeps_direction) {
-        let message = "path finds no light of a [[light]] without size that passes mirror or glass before it meets a \
-                       surface: what they would throw on it stays dark";
+        let message = CAUSTICS_MISSING;
         warnings.push((Cause::Integrator, message.to_owned()));
     }
     if photons.is_some()
         && has(&is_specular)
         && scene.lights.iter().any(|light| light.sends() && light.is_steady())
     {
-        let message =
-            "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces";
+        let message = "photons ignore lights with `falloff = \"none\"`: mirrors and glass reflect none of their light onto surfaces";
         warnings.push((Cause::Photons, message.to_owned()));
     }
     if photons.is_none() && settings.view == View::Photons {
-        let message = "the view `photons` shows nothing: photons are off, or `path` renders";
+        let message = "the view `photons` is empty: photons are off or the integrator is `path`";
         warnings.push((Cause::View, message.to_owned()));
     }
     if photons.is_some() && scene.photons.count > MOST_PHOTONS {
-        let message =
-            format!("a pass sends {MOST_PHOTONS} photons at most, for their memory: `count` is larger");
+        let message = format!(
+            "`count` exceeds the maximum of {MOST_PHOTONS} photons per pass, which limits their memory"
+        );
         warnings.push((Cause::PhotonCount, message));
     }
     if render.clamp > 0.0 {
-        let message =
-            format!("`clamp` {} makes the picture less noisy, but too dark: it is biased", render.clamp);
+        let message = format!("`clamp = {}` {CLAMP_EFFECT}", render.clamp);
         warnings.push((Cause::Clamp, message));
     }
     warnings

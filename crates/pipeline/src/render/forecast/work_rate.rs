@@ -1,40 +1,40 @@
-//! The rate of work, and the time that the rest of it takes.
+//! Rate of work, and the remaining time.
 
-/// Seconds over which the rate is averaged.
+/// Time constant of the rate's average in seconds.
 const MEMORY_SECONDS: f64 = 3.0;
-/// Shortest time between two measurements of the rate.
+/// Minimum time between two measurements of the rate.
 const SHORTEST_SECONDS: f64 = 0.05;
 
-/// Work done against time, with a rate that forgets slowly.
+/// Work done over time, as a decaying average rate.
 #[derive(Clone, Debug)]
-pub(crate) struct Pace {
+pub(crate) struct WorkRate {
     fraction: f64,
     rate: Option<f64>,
     measured: (f64, f64),
 }
 
-/// Work done and to come.
+/// Amount of work, and time spent on other things.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Work {
     pub(crate) done: f64,
-    /// In all; none where nobody knows.
+    /// Total work. `None` if it is unknown.
     pub(crate) total: Option<f64>,
-    /// Seconds spent beside the work, so far and to come.
+    /// Seconds spent on other things, so far and in the future.
     pub(crate) aside: [f64; 2],
 }
 
-impl Pace {
-    /// Pace of work of which a part was done before the clock started.
+impl WorkRate {
+    /// Creates a rate for work of which `done` was done before the clock started.
     pub(crate) fn new(done: f64) -> Self {
         Self { fraction: 0.0, rate: None, measured: (0.0, done) }
     }
 
-    /// Work a second, once it is known.
+    /// Work per second, once it has been measured.
     pub(crate) fn rate(&self) -> Option<f64> {
         self.rate
     }
 
-    /// The fraction done, which never falls, and the seconds to go, once they are known.
+    /// Returns the fraction done, which never decreases, and the remaining seconds once the rate is known.
     pub(crate) fn at(&mut self, seconds: f64, work: Work) -> (f64, Option<f64>) {
         let Work { done, total, aside: [aside, aside_to_come] } = work;
         let seconds = seconds - aside;
@@ -43,13 +43,13 @@ impl Pace {
         if span >= SHORTEST_SECONDS && done > before {
             let rate = (done - before) / span;
             let weight = 1.0 - (-span / MEMORY_SECONDS).exp();
-            // Early on what is late counts more: the first passes are slower.
+            // Weigh recent work more at the beginning, because the first passes are slower.
             let weight = weight.max(2.0 * span / seconds).min(1.0);
             self.rate = Some(self.rate.map_or(rate, |old| old + weight * (rate - old)));
             self.measured = (seconds, done);
         }
         let Some(total) = total else { return (self.fraction, None) };
-        // What is aside, as the work that its time is worth.
+        // Convert the time aside to work.
         let rate = self.rate.unwrap_or(0.0);
         let all = total + rate * (aside + aside_to_come);
         let fraction = if all > 0.0 { (done + rate * aside) / all } else { 0.0 };
@@ -62,30 +62,30 @@ impl Pace {
 mod tests {
     use super::*;
 
-    /// Work of which a part is done, with no time spent beside it.
+    /// Creates work without time aside.
     fn of(done: f64, total: f64) -> Work {
         Work { done, total: Some(total), aside: [0.0; 2] }
     }
 
     #[test]
-    fn time_aside_is_counted_by_itself() {
-        // Two seconds aside and one at work, for 100 of 400.
-        let mut pace = Pace::new(0.0);
+    fn time_aside_counts_separately() {
+        // Two seconds aside and one at work for 100 of 400.
+        let mut pace = WorkRate::new(0.0);
         let work = Work { done: 100.0, total: Some(400.0), aside: [2.0, 6.0] };
         let (fraction, eta) = pace.at(3.0, work);
         assert_eq!((fraction, eta), (0.25, Some(9.0)));
     }
 
     #[test]
-    fn of_work_that_nobody_knows_the_end_of_no_end_is_told() {
-        let mut pace = Pace::new(0.0);
+    fn unknown_total_has_no_eta() {
+        let mut pace = WorkRate::new(0.0);
         assert_eq!(pace.at(1.0, Work { total: None, ..of(100.0, 0.0) }), (0.0, None));
         assert_eq!(pace.at(2.0, of(200.0, 400.0)), (0.5, Some(2.0)));
     }
 
     #[test]
-    fn steady_work_is_foretold_exactly() {
-        let mut pace = Pace::new(0.0);
+    fn steady_work_is_predicted_exactly() {
+        let mut pace = WorkRate::new(0.0);
         assert_eq!(pace.at(0.0, of(0.0, 1000.0)), (0.0, None));
         for step in 1..10_u32 {
             let (fraction, eta) = pace.at(f64::from(step), of(f64::from(step) * 100.0, 1000.0));
@@ -96,8 +96,8 @@ mod tests {
     }
 
     #[test]
-    fn the_fraction_never_falls_and_work_from_before_is_no_speed() {
-        let mut pace = Pace::new(500.0);
+    fn fraction_never_falls_and_ignores_earlier_work() {
+        let mut pace = WorkRate::new(500.0);
         let (fraction, eta) = pace.at(1.0, of(600.0, 1000.0));
         assert_eq!(fraction, 0.6);
         assert!((eta.expect("a rate") - 4.0).abs() < 1e-9);
@@ -105,8 +105,8 @@ mod tests {
     }
 
     #[test]
-    fn a_change_of_speed_is_learnt() {
-        let mut pace = Pace::new(0.0);
+    fn rate_follows_a_change_of_speed() {
+        let mut pace = WorkRate::new(0.0);
         for step in 1..=100_u32 {
             pace.at(f64::from(step) * 0.1, of(f64::from(step) * 100.0, 100_000.0));
         }

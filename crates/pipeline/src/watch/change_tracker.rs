@@ -1,0 +1,127 @@
+//! Decides from hints when files are checked and when they have settled.
+
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::time::Instant;
+
+use super::folders::Hint;
+use super::{BETWEEN_CHANGES, WatchDelays};
+
+/// Tracks files that may be changing.
+#[derive(Debug)]
+pub(super) struct ChangeTracker {
+    delays: WatchDelays,
+    pending: Option<PendingHints>,
+    /// Files that were written to and not yet closed.
+    open: HashSet<OsString>,
+    unsettled: Option<Unsettled>,
+    /// Earliest time of the next reported change.
+    not_before: Option<Instant>,
+}
+
+/// Hints that have not been acted on.
+#[derive(Clone, Copy, Debug)]
+struct PendingHints {
+    first: Instant,
+    /// Time of the next check.
+    due: Instant,
+    /// Whether the last hint completed a save.
+    is_complete: bool,
+}
+
+/// A reported change that may not be the last.
+#[derive(Clone, Copy, Debug)]
+struct Unsettled {
+    since: Instant,
+    /// Time of the last hint.
+    latest: Instant,
+}
+
+impl ChangeTracker {
+    pub(super) fn new(delays: WatchDelays) -> Self {
+        Self { delays, pending: None, open: HashSet::new(), unsettled: None, not_before: None }
+    }
+
+    /// Adds a hint about a watched file.
+    pub(super) fn hint(&mut self, hint: Hint, now: Instant) {
+        let first = self.pending.map_or(now, |pending| pending.first);
+        let was_complete = self.pending.is_some_and(|pending| pending.is_complete);
+        let is_complete = match hint {
+            Hint::Complete(name) => {
+                self.open.remove(&name);
+                true
+            }
+            Hint::Written(name) => {
+                self.open.insert(name);
+                false
+            }
+            Hint::Gone(name) => {
+                self.open.remove(&name);
+                false
+            }
+            // Removing a backup or setting a time stamp after a save leaves it complete.
+            Hint::Touched => was_complete,
+        };
+        let due = if is_complete { now } else { (now + self.delays.quiet).min(first + self.delays.longest) };
+        let due = self.not_before.map_or(due, |earliest| due.max(earliest));
+        self.pending = Some(PendingHints { first, due, is_complete });
+        if let Some(unsettled) = &mut self.unsettled {
+            unsettled.latest = now;
+        }
+    }
+
+    /// Returns the time of the next check. `None` if no hint calls for one.
+    pub(super) fn due(&self) -> Option<Instant> {
+        let look = self.pending.map(|pending| pending.due);
+        [look, self.unsettled.map(|unsettled| self.settled_at(unsettled))].into_iter().flatten().min()
+    }
+
+    /// Whether there are pending hints.
+    pub(super) fn has_hints(&self) -> bool {
+        self.pending.is_some()
+    }
+
+    /// Discards the hints after a check found no change.
+    pub(super) fn discard_hints(&mut self) {
+        self.pending = None;
+    }
+
+    /// Whether it is too early to report a change that hints led to. `is_missing`: a file is missing or empty; `moves`:
+    /// the previous check found another change.
+    pub(super) fn is_early(&mut self, is_missing: bool, moves: bool, now: Instant) -> bool {
+        let Some(pending) = &mut self.pending else { return false };
+        let due = if is_missing {
+            pending.first + self.delays.quiet_missing
+        } else if moves && !pending.is_complete {
+            (now + self.delays.quiet).min(pending.first + self.delays.longest)
+        } else {
+            return false;
+        };
+        let is_early = now < due;
+        if is_early {
+            *pending = PendingHints { due, is_complete: false, ..*pending };
+        }
+        is_early
+    }
+
+    /// Records that the change is reported, and returns the time of its first hint.
+    pub(super) fn reported(&mut self, now: Instant) -> Instant {
+        let noticed = self.pending.take().map_or(now, |pending| pending.first);
+        self.not_before = Some(now + BETWEEN_CHANGES);
+        let since = self.unsettled.map_or(now, |unsettled| unsettled.since);
+        self.unsettled = Some(Unsettled { since, latest: now });
+        noticed
+    }
+
+    /// Whether the reported change has settled. Returns true once per change.
+    pub(super) fn settles(&mut self, now: Instant) -> bool {
+        let settles = self.unsettled.is_some_and(|unsettled| self.settled_at(unsettled) <= now);
+        self.unsettled = self.unsettled.filter(|_| !settles);
+        settles
+    }
+
+    fn settled_at(&self, unsettled: Unsettled) -> Instant {
+        let wait = if self.open.is_empty() { self.delays.settle } else { self.delays.settle_open };
+        (unsettled.latest + wait).min(unsettled.since + self.delays.settle_longest)
+    }
+}
