@@ -210,7 +210,7 @@ mod tests {
     fn every_thread_counts() {
         let bytes = |threads| {
             let overrides = Overrides { threads: Some(threads), ..Overrides::default() };
-            Foretold::of_picture(&planned(&overrides)).bytes()
+            MemoryEstimate::of_picture(&planned(&overrides)).bytes()
         };
         assert_eq!(bytes(65) - bytes(1), 64 * THREAD);
     }

@@ -14,7 +14,7 @@ use crate::protocol::StageReport;
 use crate::render::film_cache::FilmCache;
 use crate::render::film_state::FilmState;
 use crate::sink::Sink;
-use crate::targets::{Target, guarded};
+use crate::targets::{OutputTarget, guarded};
 use crate::world::World;
 
 /// Results of a request.
