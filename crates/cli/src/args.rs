@@ -21,7 +21,7 @@ use crate::console::answer_columns;
 use crate::environment;
 use crate::film::Rect;
 use crate::output::{Format, MovingFormat};
-use crate::pipeline::settings::{Checkpoints, Layer, Overrides, Resume, Side, UpAxis, View};
+use crate::pipeline::settings::{Checkpoints, OutputLayer, Overrides, Resume, Side, UpAxis, View};
 use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
@@ -751,16 +751,16 @@ fn error_bound(text: &str) -> Result<f64, String> {
 
 /// Layers of EXR files, without duplicates.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layers(pub Vec<Layer>);
+pub struct Layers(pub Vec<OutputLayer>);
 
 fn layers(text: &str) -> Result<Layers, String> {
     if text == "all" {
-        return Ok(Layers(Layer::ALL.to_vec()));
+        return Ok(Layers(OutputLayer::ALL.to_vec()));
     }
     let mut layers = Vec::new();
     for name in text.split(',').map(str::trim) {
-        let layer = Layer::named(name).ok_or_else(|| {
-            let known: Vec<_> = Layer::ALL.iter().map(|layer| layer.name()).collect();
+        let layer = OutputLayer::named(name).ok_or_else(|| {
+            let known: Vec<_> = OutputLayer::ALL.iter().map(|layer| layer.name()).collect();
             format!("unknown layer {name:?}; expected all, {}", known.join(", "))
         })?;
         if !layers.contains(&layer) {
@@ -771,7 +771,7 @@ fn layers(text: &str) -> Result<Layers, String> {
 }
 
 fn turntable(text: &str) -> Result<u32, String> {
-    whole(text, 1..=turntable::MOST)
+    whole(text, 1..=turntable::MAX_FRAMES)
 }
 
 fn threads(text: &str) -> Result<usize, String> {

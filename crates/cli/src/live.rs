@@ -11,7 +11,7 @@ use crate::lower::Order;
 use crate::output::held;
 use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
-use crate::pipeline::watch::{Lost, Watcher, missing_folder};
+use crate::pipeline::watch::{ExternalChange, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
@@ -118,7 +118,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
 fn last_words(
     writes: &Writes,
     ended: &TuiOutcome,
-    (has_ended, lost, call): (bool, &[(PathBuf, Lost)], &str),
+    (has_ended, lost, call): (bool, &[(PathBuf, ExternalChange)], &str),
 ) -> Vec<String> {
     let mut lines = writes.unreported(ended.is_write_unanswered, has_ended);
     let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
@@ -355,8 +355,8 @@ mod tests {
             not_kept: Some("not kept: --shadows off".to_owned()),
         };
         let writes = Writes::default();
-        let lost = [(PathBuf::from("a.png"), Lost::Removed)];
-        let said = |status, lost: &[(PathBuf, Lost)]| {
+        let lost = [(PathBuf::from("a.png"), ExternalChange::Removed)];
+        let said = |status, lost: &[(PathBuf, ExternalChange)]| {
             last_words(&writes, &ended(status), (true, lost, "glimt a.toml --seed 1"))
         };
         let not_kept = "not kept: --shadows off";

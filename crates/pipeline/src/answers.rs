@@ -70,14 +70,14 @@ pub struct Picked {
     /// Column and row.
     pub pixel: [u32; 2],
     /// First visible object. `None` if the ray hits nothing.
-    pub thing: Option<Thing>,
+    pub thing: Option<PickedObject>,
     /// Linear color of the pixel so far. `None` if it has no sample yet.
     pub color: Option<[f32; 3]>,
 }
 
 /// Shape hit by a camera ray.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Thing {
+pub struct PickedObject {
     /// Name of the shape's table in the scene file.
     pub shape: &'static str,
     /// Name of the shape, if it has one.
@@ -111,7 +111,7 @@ pub struct MovedCamera {
 
 /// Result of keeping the camera in the scene file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kept {
+pub struct KeptCamera {
     /// The scene file.
     pub path: PathBuf,
     /// Whether the file was written; otherwise it already had this camera.

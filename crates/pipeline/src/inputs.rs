@@ -119,7 +119,7 @@ pub(super) struct OnDisk<'a> {
 }
 
 impl<'a> OnDisk<'a> {
-    /// Returns the input that a path leads to, or cannot be distinguished from.
+    /// Returns the input that a path leads to or cannot be distinguished from.
     pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
         if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
             return Some(input);

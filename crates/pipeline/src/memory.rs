@@ -26,7 +26,7 @@ const PHOTON: u64 = 220;
 const KEPT_MAPS: u64 = 128 << 20;
 
 /// Maximum number of bytes of an animation's frames without `--memory`.
-const MOST_FRAMES: u64 = 4 << 30;
+const MAX_FRAMES: u64 = 4 << 30;
 /// Name of the frames among the items.
 const FRAMES: &str = "the frames";
 /// Name of the own image's film among the items.
@@ -118,12 +118,12 @@ impl MemoryEstimate {
     /// [`Self::check`] with the system's limit as a parameter.
     fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<u64, Stop> {
         let all = self.bytes();
-        let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MOST_FRAMES);
+        let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MAX_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
             return Err(Stop::work(format!(
                 "the frames of the animation need {} of memory until it is written; render fewer or smaller frames, or \
                  numbered files such as a_####.png; --memory {} allows it",
-                words(*bytes),
+                format_bytes(*bytes),
                 allowance(all)
             )));
         }
@@ -136,7 +136,8 @@ impl MemoryEstimate {
         let mut largest = self.0.clone();
         largest.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
         let items = largest.iter().filter(|(_, bytes)| *bytes * 100 > all);
-        let items: Vec<String> = items.map(|(name, bytes)| format!("{name} {}", words(*bytes))).collect();
+        let items: Vec<String> =
+            items.map(|(name, bytes)| format!("{name} {}", format_bytes(*bytes))).collect();
         let remedy = match largest.first() {
             _ if all - self.own_film() <= most => {
                 "return to the scene's own settings, or let its image finish first"
@@ -156,9 +157,9 @@ impl MemoryEstimate {
         let try_anyway = format!(", raise the limit, or try anyway with --memory {}", allowance(all));
         Err(Stop::work(format!(
             "the render needs about {} of memory ({}), more than the {} of {setting}; {remedy}{}",
-            words(all),
+            format_bytes(all),
             items.join(", "),
-            words(most),
+            format_bytes(most),
             if plan.memory.is_some() { "" } else { &try_anyway }
         )))
     }
@@ -180,7 +181,7 @@ fn allowance(bytes: u64) -> String {
 }
 
 /// Formats a size: `1.25 GiB`, `300 MiB`, `12 KiB`, `1 byte`.
-fn words(bytes: u64) -> String {
+fn format_bytes(bytes: u64) -> String {
     match bytes {
         1 => return "1 byte".to_owned(),
         0..1024 => return format!("{bytes} bytes"),

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, Effective, Layer, Overrides, Side, UpAxis, View};
+use super::settings::{Checkpoints, Effective, OutputLayer, Overrides, Side, UpAxis, View};
 use super::turntable::{self, Turn};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
@@ -40,7 +40,7 @@ pub(super) struct Plan {
     /// Turntable frame. `None` for a still image.
     pub(super) turn: Option<Turn>,
     /// Layers in addition to the image in EXR files.
-    pub(super) layers: Vec<Layer>,
+    pub(super) layers: Vec<OutputLayer>,
     /// Side from which a model is seen and its up axis, if the command line sets them.
     pub(super) from: Option<Side>,
     pub(super) up: Option<UpAxis>,
@@ -138,7 +138,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
 }
 
 /// Maximum number of photons per pass, which must be stored.
-pub(super) const MOST_PHOTONS: u64 = 4_000_000;
+pub(super) const MAX_PHOTONS: u64 = 4_000_000;
 
 /// Bounds of the default photon count, which is the number of pixels. Fewer photons increase the error more than they
 /// save time; more take the time of further passes, and delay the first image.
@@ -151,7 +151,7 @@ fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
         let pixels = u64::from(width) * u64::from(height);
         pixels.clamp(*PHOTONS_BY_PIXELS.start(), *PHOTONS_BY_PIXELS.end())
     };
-    let count = if count == 0 { by_pixels() } else { count.min(MOST_PHOTONS) };
+    let count = if count == 0 { by_pixels() } else { count.min(MAX_PHOTONS) };
     PhotonSettings { count: count as u32, radius: radius as f32, bounces }
 }
 
@@ -399,7 +399,7 @@ mod tests {
             ("", 16, 16, 8192),
             ("", 1920, 1080, 200_000),
             ("count = 500", 320, 240, 500),
-            ("count = 9_000_000", 320, 240, MOST_PHOTONS as u32),
+            ("count = 9_000_000", 320, 240, MAX_PHOTONS as u32),
         ] {
             assert_eq!(count(table, width, height, None), photons, "{table} at {width}×{height}");
             assert_eq!(count(table, width, height, part), photons, "independent of the crop");

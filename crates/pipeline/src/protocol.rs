@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
-pub use super::answers::{CameraEdit, ImagePosition, Kept, MovedCamera, Picked, Section, Thing};
+pub use super::answers::{CameraEdit, ImagePosition, KeptCamera, MovedCamera, Picked, PickedObject, Section};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
@@ -235,7 +235,7 @@ pub enum Event {
         /// Number of the request.
         generation: u64,
         /// The file with the camera, or why glimt did not write it.
-        outcome: Result<Kept, String>,
+        outcome: Result<KeptCamera, String>,
     },
     /// Answer to [`Command::UndoCamera`].
     CameraUndone {

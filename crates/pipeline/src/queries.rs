@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::inputs::Inputs;
-use super::protocol::{CameraEdit, Event, ImagePosition, Kept, MovedCamera, Picked, Thing, Viewpoint};
+use super::protocol::{
+    CameraEdit, Event, ImagePosition, KeptCamera, MovedCamera, Picked, PickedObject, Viewpoint,
+};
 use super::render::film_state::FilmState;
 use super::sink::Sink;
 use super::stages::parse::Parsed;
@@ -75,11 +77,11 @@ impl QueryContext {
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
         let color = state.and_then(|state| state.film.pixel(Quantity::Radiance, x, y));
         let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let thing = self.thing(self.settings.pixel_to_camera(middle));
+        let thing = self.object_at(self.settings.pixel_to_camera(middle));
         Picked { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
     }
 
-    fn thing(&self, place: DVec2) -> Option<Thing> {
+    fn object_at(&self, place: DVec2) -> Option<PickedObject> {
         let (world, loaded) = (&self.world, &self.parsed.loaded);
         let ray = world.camera.pinhole_ray(place);
         let hit = world.geometry.closest(&ray)?;
@@ -93,7 +95,7 @@ impl QueryContext {
             },
         };
         let is_front = surface.shading_normal.dot(ray.direction) <= 0.0;
-        Some(Thing {
+        Some(PickedObject {
             shape: object.shape.kind(),
             name: object.name.as_deref().map(str::to_owned),
             path: loaded.path.clone(),
@@ -112,7 +114,7 @@ impl QueryContext {
         &self,
         MovedCamera { camera, own }: &MovedCamera,
         inputs: &Inputs,
-    ) -> Result<Kept, String> {
+    ) -> Result<KeptCamera, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
         if is_model(&path) {
@@ -141,7 +143,7 @@ impl QueryContext {
             Some(CameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
         };
         let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
-        Ok(Kept { path, is_new: edit.is_some(), is_own, of_model: false, edit })
+        Ok(KeptCamera { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
 }
 
@@ -194,7 +196,7 @@ fn replace(
 }
 
 /// Writes the scene of a model with this camera next to the model, without replacing a file.
-fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, String> {
+fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<KeptCamera, String> {
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
@@ -203,7 +205,7 @@ fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, Str
     let text = loaded.text_with_camera(camera)?;
     write::new_file(&path, text.as_bytes())
         .map_err(|error| format!("cannot write {shown}: {}", describe_error(&error)))?;
-    Ok(Kept { path, is_new: true, is_own: false, of_model: true, edit: None })
+    Ok(KeptCamera { path, is_new: true, is_own: false, of_model: true, edit: None })
 }
 
 #[cfg(test)]

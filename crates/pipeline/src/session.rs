@@ -101,7 +101,7 @@ mod tests {
         let mut session = Session::default();
         let mut render = |seed, samples| {
             let overrides = Overrides { seed: Some(seed), samples: Some(samples), ..Overrides::default() };
-            session.render(&scene, &overrides, &CancelToken::new()).expect("a picture")
+            session.render(&scene, &overrides, &CancelToken::new()).expect("an image")
         };
         let (one, again, other, more) = (render(1, 2), render(1, 2), render(2, 2), render(1, 4));
         assert_eq!((one.image.width, one.image.height), (8, 6));

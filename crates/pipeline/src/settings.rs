@@ -40,7 +40,7 @@ macro_rules! overrides {
             /// Movement of the camera.
             pub camera: CameraChange,
             /// Layers in addition to the image in EXR files.
-            pub layers: Vec<Layer>,
+            pub layers: Vec<OutputLayer>,
             /// Frame of a turntable. `None` for a still image.
             pub turn: Option<Turn>,
             /// Pixels to render. The rest of the image stays black.
@@ -91,7 +91,7 @@ choice! {
 
 choice! {
     /// Extra channels (AOVs) in EXR files.
-    pub enum Layer {
+    pub enum OutputLayer {
         /// Diffuse reflectance.
         Albedo = "albedo",
         /// Shading normal in world space, from -1 to 1; 0 for no hit.
@@ -125,7 +125,7 @@ choice! {
     }
 }
 
-/// When checkpoints of a render are saved next to its output, and used.
+/// When a render saves checkpoints next to its output, and whether it resumes from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Checkpoints {
     /// Seconds between checkpoints. 0 disables them.

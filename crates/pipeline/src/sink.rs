@@ -20,7 +20,7 @@ pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Progress fractions at the begin and end of the render if it is only a part of the work.
+    /// Progress fractions at the start and end of the render if it is only a part of the work.
     pub(super) within: Option<[f64; 2]>,
 }
 

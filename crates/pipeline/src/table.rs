@@ -1,4 +1,4 @@
-//! The table of stages: times each stage and reports its begin and end.
+//! The table of stages: times each stage and reports its start and end.
 
 use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;

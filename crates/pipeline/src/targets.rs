@@ -49,7 +49,7 @@ pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     let inputs = inputs.on_disk();
     // The numbers of later frames keep their files apart.
     let mut first = HashMap::new();
-    for target in targets_now(plan) {
+    for target in current_targets(plan) {
         if let Some(identity) = FileIdentity::of(target.path) {
             first.entry(identity).or_insert(target);
         }
@@ -97,7 +97,7 @@ pub(super) fn guarded<'a, T>(
             if real == target.path {
                 return None;
             }
-            let mut others = targets_now(plan).filter(|other| *other != target);
+            let mut others = current_targets(plan).filter(|other| *other != target);
             others.find(|other| FileIdentity::of(other.path).as_ref() == Some(at))
         };
         match conflict(plan, target, real, &inputs, twin) {
@@ -122,11 +122,11 @@ fn one_line(conflict: &Diagnostic) -> String {
 /// Returns the files of this request, then the files of later turntable frames.
 fn targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::picture(plan, path);
-    targets_now(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
+    current_targets(plan).chain(plan.later_outputs.iter().map(PathBuf::as_path).map(picture))
 }
 
 /// Returns the images and then the report.
-fn targets_now(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
+fn current_targets(plan: &Plan) -> impl Iterator<Item = OutputTarget<'_>> {
     let picture = |path| OutputTarget::picture(plan, path);
     let report = plan.report.iter().map(|path| OutputTarget::report(path));
     let pictures = plan.outputs.iter().chain(&plan.moving);

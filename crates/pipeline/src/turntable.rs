@@ -12,7 +12,7 @@ use crate::output::MovingFormat;
 use crate::scene::description::Pose;
 
 /// Maximum number of frames.
-pub const MOST: u32 = 10_000;
+pub const MAX_FRAMES: u32 = 10_000;
 
 /// Placeholder of a digit in a file name.
 const DIGIT: u8 = b'#';
@@ -47,7 +47,7 @@ impl Turn {
     }
 
     /// Returns the vectors from `look_at` to the camera for all frames.
-    pub(super) fn arms(of: u32, arm: DVec3, up: DVec3) -> impl Iterator<Item = DVec3> {
+    pub(super) fn camera_offsets(of: u32, arm: DVec3, up: DVec3) -> impl Iterator<Item = DVec3> {
         let first = Pose { position: arm, look_at: DVec3::ZERO, up };
         (0..of.max(1)).map(move |number| Self { number, of: of.max(1) }.pose(&first).position)
     }
@@ -58,7 +58,7 @@ impl Turn {
 /// # Errors
 /// A message with a suggestion.
 pub fn check_name(path: &Path) -> Result<(), String> {
-    if MovingFormat::of(path).is_some() || numbers(path).is_some() {
+    if MovingFormat::of(path).is_some() || split_placeholder(path).is_some() {
         return Ok(());
     }
     let name = path.display();
@@ -71,7 +71,7 @@ pub fn check_name(path: &Path) -> Result<(), String> {
 
 /// Whether a file name has a placeholder for the frame number.
 pub fn has_number(path: &Path) -> bool {
-    numbers(path).is_some()
+    split_placeholder(path).is_some()
 }
 
 /// Returns the numbered file name for a still image's: `a.png` becomes `a_####.png`.
@@ -88,7 +88,7 @@ pub fn suggested(path: &Path) -> PathBuf {
 /// Returns the file of a frame, with its number, from 1, in place of the last run of `#`. Returns `None` if there is
 /// none.
 pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
-    let (before, digits, after) = numbers(path)?;
+    let (before, digits, after) = split_placeholder(path)?;
     Some(path.with_file_name(with_number(before, (turn.number + 1, digits), after)))
 }
 
@@ -120,11 +120,11 @@ pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
     };
     let file =
         |next: u32| last.with_file_name(with_number(&name[..run.start], (next, run.len()), &name[run.end..]));
-    (turn.number + 2..=MOST).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
+    (turn.number + 2..=MAX_FRAMES).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
 }
 
 /// Splits a file name into the bytes before its last run of `#`, the length of the run, and the bytes after it.
-fn numbers(path: &Path) -> Option<(&[u8], usize, &[u8])> {
+fn split_placeholder(path: &Path) -> Option<(&[u8], usize, &[u8])> {
     let name = path.file_name()?.as_bytes();
     let end = name.iter().rposition(|byte| *byte == DIGIT)? + 1;
     let start = name[..end].iter().rposition(|byte| *byte != DIGIT).map_or(0, |at| at + 1);

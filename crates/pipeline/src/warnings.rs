@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::plan::MOST_PHOTONS;
+use super::plan::MAX_PHOTONS;
 use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
@@ -103,9 +103,9 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
         let message = "the view `photons` is empty: photons are off or the integrator is `path`";
         warnings.push((Cause::View, message.to_owned()));
     }
-    if photons.is_some() && scene.photons.count > MOST_PHOTONS {
+    if photons.is_some() && scene.photons.count > MAX_PHOTONS {
         let message = format!(
-            "`count` exceeds the maximum of {MOST_PHOTONS} photons per pass, which limits their memory"
+            "`count` exceeds the maximum of {MAX_PHOTONS} photons per pass, which limits their memory"
         );
         warnings.push((Cause::PhotonCount, message));
     }

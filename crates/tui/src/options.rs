@@ -8,7 +8,7 @@ use super::color::ColorChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::{Changed, Lost, News, OutputChange};
+pub use crate::pipeline::watch::{Changed, ExternalChange, News, OutputChange};
 
 choice! {
     /// Choice of how the preview is drawn.

@@ -4,7 +4,7 @@ use super::Engine;
 use crate::cache::first_with_room;
 
 /// Maximum memory of files and trees that the current scene does not need.
-const MOST_SPARE_BYTES: usize = 256 << 20;
+const MAX_SPARE_BYTES: usize = 256 << 20;
 
 impl Engine {
     /// Ends a request. After a success, values that it did not use become candidates for eviction.
@@ -16,7 +16,7 @@ impl Engine {
         let meshes = self.meshes.eviction_candidates();
         let candidates =
             meshes.chain(self.textures.eviction_candidates()).chain(self.accel.eviction_candidates());
-        let first = first_with_room(candidates, MOST_SPARE_BYTES);
+        let first = first_with_room(candidates, MAX_SPARE_BYTES);
         self.meshes.drop_before(first);
         self.textures.drop_before(first);
         self.accel.drop_before(first);

@@ -37,7 +37,7 @@ use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
 use super::render::layers;
-use super::render::preview::Screen;
+use super::render::preview::PreviewTarget;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
 use super::report::finish::{Finished, report};
@@ -53,7 +53,7 @@ use super::stages::parse::{Parsed, SceneSource, parse};
 use super::stages::photons::{PhotonCache, PhotonContext, PhotonStore, photons};
 use super::stages::render::render;
 use super::stages::textures::{NeededTextures, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Frames, WrittenFiles, check_targets, write_by_hand};
+use super::stages::write::{Destination, Frames, WrittenFiles, check_targets, write_on_request};
 use super::stages::{Findings, Reading, Staged, Stop};
 use super::stopwatch::Stopwatch;
 use super::table::StageTable;
@@ -138,7 +138,7 @@ pub(super) struct Engine {
 }
 
 /// Maximum number of times that a request starts again because the scene's files change.
-const MOST_READS: usize = 16;
+const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.
 #[derive(Clone)]
@@ -224,7 +224,7 @@ impl Engine {
         let before = self.shown();
         let outcome = self.run(request, sink, context, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
-            findings.read_named(diagnostics, &request.scene, &self.contents, context.token);
+            findings.watch_underlined_files(diagnostics, &request.scene, &self.contents, context.token);
         }
         // Files that are watched must not be written.
         self.inputs.add_read(&findings.files);
@@ -259,7 +259,7 @@ impl Engine {
     /// Sends a preview of the current image at another size, outside of a request.
     pub(super) fn show_now(&mut self, bounds: Option<PreviewSize>, sink: &Sink, token: &CancelToken) {
         if let (Some(state), Some(plan), Some(pool)) = (self.films.current_mut(), &self.plan, &self.pool) {
-            Screen { bounds, plan, sink }.show(state, pool, token);
+            PreviewTarget { bounds, plan, sink }.show(state, pool, token);
         }
     }
 
@@ -296,7 +296,7 @@ impl Engine {
         self.say_own(request, ready.film, sink);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, context))?;
         // Links and files may have changed during the render.
-        self.look_for_conflicts(request, &ready.plan, findings, sink)?;
+        self.check_conflicts(request, &ready.plan, findings, sink)?;
         let was_own_written = self.is_own_written();
         let written =
             table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, context.writing));
@@ -372,7 +372,7 @@ impl Engine {
             is_moved: request.overrides.camera.is_any(),
             rate: &self.coarse_rate,
         };
-        let screen = Screen { bounds: request.preview, plan, sink };
+        let screen = PreviewTarget { bounds: request.preview, plan, sink };
         let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
         table.run(Stage::Photons, || photons(asked, key, store, sending, hear, before))?;
         let photons_key = plan.settings.effective().photons.filter(|_| plan.settings.gathers()).map(key);
@@ -390,13 +390,13 @@ impl Engine {
         token: &CancelToken,
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
-        for _ in 0..MOST_READS {
+        for _ in 0..MAX_READS {
             let snapshot = Snapshot::of(Arc::clone(&self.contents));
             let ready = self.prepare(request, table, (&snapshot, token), findings);
             if token.is_cancelled() || snapshot.changed().is_none() {
                 return ready;
             }
-            findings.start_again();
+            findings.reset();
             table.stages.clear();
         }
         Err(Stop::work(
@@ -443,7 +443,7 @@ impl Engine {
             },
         });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
-        let looked = self.look_for_conflicts(request, &plan, findings, table.sink);
+        let looked = self.check_conflicts(request, &plan, findings, table.sink);
         // The current image is of the previous scene and may still be written.
         self.inputs.add(before);
         looked?;
@@ -461,7 +461,7 @@ impl Engine {
         let estimate = MemoryEstimate::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes);
         self.check_memory(&estimate, request, (&plan, own_plan.as_ref()))?;
         self.inputs = inputs(&parsed, &meshes, findings);
-        self.look_for_conflicts(request, &plan, findings, table.sink)?;
+        self.check_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
         let good = LastGoodScene { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
         let ready = self.build(request, &good, (plan, own_plan), table, &reading)?;
@@ -516,8 +516,9 @@ impl Engine {
 
     /// Returns the share of the image that this process renders. `None` for the whole image.
     fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Share> {
-        let are_sent = photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::are_sent);
-        plan.shard.map(|shard| Share::new(shard, are_sent, plan.settings.render.samples))
+        let emits_photons =
+            photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::emits_photons);
+        plan.shard.map(|shard| Share::new(shard, emits_photons, plan.settings.render.samples))
     }
 
     /// Loads all files that the scene references. Tries every file before it returns an error.
@@ -569,7 +570,7 @@ impl Engine {
         let pulse = |state: &FilmState, is_covered: bool| {
             if !is_covered {
                 context.postpone_write(sink);
-            } else if orders.take_write() && write_by_hand(state, to, &mut written.borrow_mut()) {
+            } else if orders.take_write() && write_on_request(state, to, &mut written.borrow_mut()) {
                 drop_report(plan, to.inputs, sink);
             }
             if let Some(query_context) = &self.query_context {

@@ -6,7 +6,7 @@ use super::super::protocol::{ImageReport, Report, Request, Writing};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::{remove_report, write_report};
 use super::super::sink::Sink;
-use super::super::stages::write::{Destination, write_by_hand, write_if_wanted, write_moving};
+use super::super::stages::write::{Destination, write_animation, write_if_wanted, write_on_request};
 use super::super::stages::{Findings, Staged, Stop};
 use super::super::targets::conflicts;
 use super::Engine;
@@ -39,7 +39,7 @@ impl Engine {
             return sink.write_failed(None, message);
         }
         if self.is_broken
-            && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)
+            && let Some(path) = self.written.first_foreign(&plan.outputs, &self.contents)
         {
             let path = path.display();
             let message = format!(
@@ -57,11 +57,11 @@ impl Engine {
             sink,
         };
         let written = &mut self.written;
-        let is_written = pool.install(|| write_by_hand(state, to, written));
+        let is_written = pool.install(|| write_on_request(state, to, written));
         let is_finished = state.is_finished(plan);
         self.note_written(is_written && is_finished && self.is_own);
         if is_written {
-            self.report_by_hand(sink);
+            self.report_written_image(sink);
         }
     }
 
@@ -70,7 +70,7 @@ impl Engine {
     ///
     /// # Errors
     /// All conflicts, if the image must be written.
-    pub(super) fn look_for_conflicts(
+    pub(super) fn check_conflicts(
         &self,
         request: &Request,
         plan: &Plan,
@@ -95,7 +95,7 @@ impl Engine {
 
     /// Writes the report of an image that the user has written with a key. If its render is not finished, removes an older
     /// report.
-    fn report_by_hand(&self, sink: &Sink) {
+    fn report_written_image(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return drop_report(plan, &self.inputs, sink) };
         let paths: Vec<String> =
@@ -150,6 +150,6 @@ impl Engine {
         written.own = own.map(|own| own.image);
         let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
         let frames = &mut self.frames;
-        pool.install(|| write_moving(state, to, (turn, frames), token))
+        pool.install(|| write_animation(state, to, (turn, frames), token))
     }
 }

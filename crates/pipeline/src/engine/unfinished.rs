@@ -77,7 +77,7 @@ impl Engine {
         // Render and write.
         let rendered = self.render(&request, &ready, photons, sink, context)?;
         let mut is_written_now = false;
-        if self.written.not_ours(&ready.plan.outputs, &self.contents).is_none() {
+        if self.written.first_foreign(&ready.plan.outputs, &self.contents).is_none() {
             // The write stage reports files that cannot be written.
             let written = self.write(&request, &ready.plan, &Findings::default(), sink, context.writing);
             is_written_now = written.is_ok_and(|staged| staged.status == Status::Done);

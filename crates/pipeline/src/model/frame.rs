@@ -14,7 +14,7 @@ const FILLED: f64 = 0.88;
 const LEAST: f64 = 1e-30;
 
 /// Maximum number of turntable frames that are measured; more directions add nothing.
-const MOST_MEASURED: u32 = 72;
+const MAX_MEASURED: u32 = 72;
 
 /// Position and orientation of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl Side {
 
 /// Returns a camera that shows all `points` of a box as large as the image's aspect ratio allows, in all `turns` frames
 /// of a turntable.
-pub(super) fn framed(
+pub(super) fn frame_model(
     [least, greatest]: [DVec3; 2],
     points: &[DVec3],
     (from, turns): (Side, u32),
@@ -53,7 +53,7 @@ pub(super) fn framed(
     // Move back until every point is inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
-    for back in Turn::arms(turns.min(MOST_MEASURED), back, up) {
+    for back in Turn::camera_offsets(turns.min(MAX_MEASURED), back, up) {
         let right = up.cross(back).normalize_or(DVec3::X);
         let above = back.cross(right);
         for point in points {
@@ -66,12 +66,12 @@ pub(super) fn framed(
     // Drop invisible digits.
     let size = half.length().max(LEAST);
     let step = size * 1e-4;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_step(part, step)));
     CameraPose { position: tidy(middle + back * distance), look_at: tidy(middle), up }
 }
 
 /// Rounds to a multiple of a power of ten near `step`.
-pub(super) fn tidied(value: f64, step: f64) -> f64 {
+pub(super) fn round_to_step(value: f64, step: f64) -> f64 {
     let unit = libm::pow(10.0, libm::floor(libm::log10(step)));
     let whole = (value / unit).round();
     // Dividing gives fewer digits than multiplying by a fraction.
@@ -120,7 +120,7 @@ mod tests {
                 let corners: Vec<DVec3> = (0..8)
                     .map(|corner| DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis])))
                     .collect();
-                let eye = framed(bounds, &corners, (from, 1), aspect);
+                let eye = frame_model(bounds, &corners, (from, 1), aspect);
                 let back = (eye.position - eye.look_at).normalize();
                 let right = eye.up.cross(back).normalize();
                 let above = back.cross(right);
@@ -145,24 +145,24 @@ mod tests {
         let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
         let corners = [bounds[0], bounds[1], DVec3::new(-0.5, 1.0, 4.0), DVec3::new(0.5, 0.0, -4.0)];
         let distance = |turns| {
-            let eye = framed(bounds, &corners, (Side::Front, turns), 1.0);
+            let eye = frame_model(bounds, &corners, (Side::Front, turns), 1.0);
             (eye.position - eye.look_at).length()
         };
-        let side = framed(bounds, &corners, (Side::Right, 1), 1.0);
+        let side = frame_model(bounds, &corners, (Side::Right, 1), 1.0);
         let of_side = (side.position - side.look_at).length();
         assert!(distance(1) < 0.6 * of_side && distance(4) >= of_side - 1e-3, "{} {of_side}", distance(4));
     }
 
     #[test]
     fn invisible_digits_are_dropped() {
-        assert_eq!(tidied(1.234_567_8, 3e-4), 1.2346);
-        assert_eq!(tidied(-12_345.678, 30.0), -12_350.0);
+        assert_eq!(round_to_step(1.234_567_8, 3e-4), 1.2346);
+        assert_eq!(round_to_step(-12_345.678, 30.0), -12_350.0);
     }
 
     /// A plane lit only by the sky and the key light has the sky's radiance.
     #[test]
     fn ground_is_as_bright_as_the_sky() {
-        let eye = framed([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
+        let eye = frame_model([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
         let direction = key_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;

@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
 use std::path::Path;
 
-use super::frame::{framed, tidied};
+use super::frame::{frame_model, round_to_step};
 use super::materials::{MaterialWriter, TextureFile};
 use super::toml::{Toml, color, list, number, vector};
 use super::{
@@ -126,12 +126,12 @@ impl Writer<'_> {
         render(&mut self.toml, size, lighting);
         let eye = match own {
             Some(own) => {
-                let eye = eye_of(own, bounds);
+                let eye = camera_pose(own, bounds);
                 camera(&mut self.toml, &eye, own.fov);
                 eye
             }
             None => {
-                let eye = framed(
+                let eye = frame_model(
                     bounds,
                     &scene.outline,
                     (show.from.unwrap_or(Side::Iso), show.turns),
@@ -269,7 +269,7 @@ impl super::materials::Files for Writer<'_> {
         self.images.insert(image);
         let bytes = self.container.image(image);
         match (self.naming, bytes) {
-            (Naming::Inside, Ok(ImageBytes::File(file))) if has_ending(&file) && file.is_file() => {
+            (Naming::Inside, Ok(ImageBytes::File(file))) if has_image_extension(&file) && file.is_file() => {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
                 TextureFile { file: name.to_string_lossy().into_owned(), image: None }
@@ -284,11 +284,11 @@ impl super::materials::Files for Writer<'_> {
             }
             (Naming::Folder(_), bytes) => {
                 let ending = match &bytes {
-                    Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
+                    Ok(ImageBytes::Inside(bytes)) => image_extension(bytes).to_owned(),
                     Ok(ImageBytes::File(path)) => {
                         let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
                         let start = || first_bytes(path).unwrap_or_default();
-                        if MAPS.contains(&own.as_str()) { own } else { ending(&start()).to_owned() }
+                        if MAPS.contains(&own.as_str()) { own } else { image_extension(&start()).to_owned() }
                     }
                     Err(_) => "png".to_owned(),
                 };
@@ -301,7 +301,7 @@ impl super::materials::Files for Writer<'_> {
 }
 
 /// Whether the file has the extension of an image format.
-fn has_ending(file: &Path) -> bool {
+fn has_image_extension(file: &Path) -> bool {
     let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     MAPS.contains(&ending.as_str())
 }
@@ -349,7 +349,7 @@ fn first_bytes(path: &Path) -> Option<[u8; 4]> {
 }
 
 /// Returns the extension of an image format from the first bytes of a file.
-fn ending(bytes: &[u8]) -> &'static str {
+fn image_extension(bytes: &[u8]) -> &'static str {
     if bytes.starts_with(b"\xff\xd8") {
         "jpg"
     } else if bytes.starts_with(b"RIFF") {
@@ -365,12 +365,12 @@ fn tidy(value: f64) -> f64 {
 }
 
 /// Converts a file's camera. It looks at the depth of the model's center.
-fn eye_of(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
+fn camera_pose(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> CameraPose {
     let size = (greatest - least).length().max(1e-12);
     let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
     let look_at = camera.position + camera.direction * depth;
     let step = size.min(depth) * 1e-6;
-    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| round_to_step(part, step)));
     let up = if (camera.up - DVec3::Y).length() < 1e-6 || is_level(camera) { DVec3::Y } else { camera.up };
     CameraPose { position: tidy(camera.position), look_at: tidy(look_at), up }
 }

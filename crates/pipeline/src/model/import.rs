@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::gltf::{ExportSource, Naming};
-use super::{ModelText, Show, in_its_scene};
+use super::{ModelText, Show, in_generated_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
@@ -91,5 +91,9 @@ fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Res
     // Ignore file names, which differ in the imported scene.
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
-    Err(AssetError::Malformed { path: path.to_owned(), line: None, reason: in_its_scene(first).message })
+    Err(AssetError::Malformed {
+        path: path.to_owned(),
+        line: None,
+        reason: in_generated_scene(first).message,
+    })
 }

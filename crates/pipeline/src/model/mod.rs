@@ -113,7 +113,7 @@ pub(crate) fn text(
 }
 
 /// ReportMarks a diagnostic as one of the generated scene, which exists in no file.
-pub(crate) fn in_its_scene(diagnostic: Diagnostic) -> Diagnostic {
+pub(crate) fn in_generated_scene(diagnostic: Diagnostic) -> Diagnostic {
     Diagnostic { message: format!("in the scene of this model, {}", diagnostic.message), ..diagnostic }
 }
 
@@ -153,8 +153,8 @@ impl Lighting {
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
         // Keep the sky's radiance valid, however close a light is.
-        const MOST: f64 = 40.0;
-        Self::FromFile { exposure: -(libm::log2(over).min(MOST) * 10.0).round() / 10.0 }
+        const MAX_STOPS: f64 = 40.0;
+        Self::FromFile { exposure: -(libm::log2(over).min(MAX_STOPS) * 10.0).round() / 10.0 }
     }
 
     /// Radiance of the sky.
@@ -221,7 +221,7 @@ fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], ey
     toml.table(&format!("[materials.{name}]"));
     toml.key("diffuse", number(ground_reflectance()));
     toml.table("[[plane]]");
-    toml.key("point", exact_vector(DVec3::new(0.0, frame::tidied(height, size * 1e-5), 0.0)));
+    toml.key("point", exact_vector(DVec3::new(0.0, frame::round_to_step(height, size * 1e-5), 0.0)));
     toml.key("material", format!("\"{name}\""));
 }
 

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::frame::framed;
+use super::frame::frame_model;
 use super::toml::Toml;
 use super::{
     FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
@@ -20,13 +20,13 @@ use crate::stages::containers::Containers;
 use crate::world::file_is_glass;
 
 /// Default up axis of a format: z for STL, as in CAD and 3D printing, and for PLY files from Blender; y otherwise.
-fn usual_up(path: &Path) -> UpAxis {
+fn default_up_axis(path: &Path) -> UpAxis {
     let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
-    if has("stl") || has("ply") && is_by_blender(path) { UpAxis::Z } else { UpAxis::Y }
+    if has("stl") || has("ply") && is_from_blender(path) { UpAxis::Z } else { UpAxis::Y }
 }
 
 /// Whether the header of a PLY file names Blender, which exports its z-up axes unchanged.
-fn is_by_blender(path: &Path) -> bool {
+fn is_from_blender(path: &Path) -> bool {
     const START: usize = 256;
     let mut start = [0; START];
     let read = File::open(path).and_then(|mut file| file.read(&mut start)).unwrap_or_default();
@@ -95,12 +95,12 @@ pub(super) fn text(
             reason: "no usable face".to_owned(),
         });
     };
-    let up = show.up.unwrap_or_else(|| usual_up(path));
+    let up = show.up.unwrap_or_else(|| default_up_axis(path));
     let upright = |at: DVec3| up.upright(at);
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
-    let eye = framed(
+    let eye = frame_model(
         bounds,
         &points,
         (show.from.unwrap_or(Side::Iso), show.turns),

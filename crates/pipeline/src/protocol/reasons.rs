@@ -37,10 +37,10 @@ pub const ALREADY_WRITTEN: &str = "already written";
 /// The request does not write its image.
 pub const PREVIEW_ONLY: &str = "preview only";
 
-/// Start of the reason of a render that continued from existing samples.
+/// Start of the reason for a render that continued from existing samples.
 pub const RESUMED: &str = "resumed after ";
 
-/// Returns the reason of a render that continued from `samples` samples per pixel.
+/// Returns the reason for a render that continued from `samples` samples per pixel.
 pub fn resumed_after(samples: u32) -> String {
     format!("{RESUMED}{samples} samples")
 }

@@ -4,7 +4,7 @@ use super::film_state::FilmState;
 use crate::scene::fingerprint::Key;
 
 /// Maximum memory of films other than the current one.
-const MOST_KEPT_BYTES: u64 = 256 << 20;
+const MAX_KEPT_BYTES: u64 = 256 << 20;
 
 /// The current film and cached ones.
 #[derive(Debug)]
@@ -21,7 +21,7 @@ pub(crate) struct FilmCache {
 
 impl Default for FilmCache {
     fn default() -> Self {
-        Self { current: None, kept: Vec::new(), pinned: None, most_kept_bytes: MOST_KEPT_BYTES, made: 0 }
+        Self { current: None, kept: Vec::new(), pinned: None, most_kept_bytes: MAX_KEPT_BYTES, made: 0 }
     }
 }
 
@@ -51,7 +51,7 @@ impl FilmCache {
 
     /// Limits the size of the cached films, apart from the current and the pinned one, and evicts films above the limit.
     pub(crate) fn limit(&mut self, bytes: u64) {
-        self.most_kept_bytes = bytes.min(MOST_KEPT_BYTES);
+        self.most_kept_bytes = bytes.min(MAX_KEPT_BYTES);
         self.make_room(0);
     }
 

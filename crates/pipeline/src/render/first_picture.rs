@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use super::preview::Screen;
+use super::preview::PreviewTarget;
 use crate::film::range_map::RangeMap;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{PhotonMaps, RenderSettings};
@@ -89,7 +89,11 @@ impl<'a> FirstPictures<'a> {
     ///
     /// # Errors
     /// [`Stop::Cancelled`].
-    pub(crate) fn show_without_photons(&self, screen: Screen<'_>, tick: impl Fn()) -> Result<(), Stop> {
+    pub(crate) fn show_without_photons(
+        &self,
+        screen: PreviewTarget<'_>,
+        tick: impl Fn(),
+    ) -> Result<(), Stop> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
         // Skip views of data, which depend on the range of the whole image or show the photons themselves.
         let is_of_light = self.plan.tone.range_map == RangeMap::None;

@@ -11,7 +11,7 @@ use crate::keys;
 use crate::math::Vec3;
 use crate::output::LayerImage;
 use crate::scene::fingerprint::Fingerprint;
-use crate::settings::Layer;
+use crate::settings::OutputLayer;
 use crate::stages::Stop;
 use crate::stages::photons::PhotonStore;
 use crate::trace::Tracer;
@@ -22,26 +22,26 @@ const DIRECTION: &[&str] = &["X", "Y", "Z"];
 const DISTANCE: &[&str] = &["Z"];
 const NUMBER: &[&str] = &["X"];
 
-/// Source of a layer's values.
-enum Source {
+/// LayerSource of a layer's values.
+enum LayerSource {
     /// Samples of a view.
     View(View),
     /// Values of the image's film.
     Film(fn(&FilmState) -> RadianceImage),
 }
 
-impl Layer {
-    fn source(self) -> (Source, &'static [&'static str]) {
+impl OutputLayer {
+    fn source(self) -> (LayerSource, &'static [&'static str]) {
         match self {
-            Self::Albedo => (Source::View(View::Albedo), COLOR),
-            Self::Normal => (Source::View(View::Normal), DIRECTION),
-            Self::Depth => (Source::View(View::Depth), DISTANCE),
-            Self::Variance => (Source::Film(variance), NUMBER),
-            Self::Samples => (Source::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
-            Self::Ambient => (Source::View(View::Ambient), COLOR),
-            Self::Diffuse => (Source::View(View::Diffuse), COLOR),
-            Self::Specular => (Source::View(View::Specular), COLOR),
-            Self::Emission => (Source::View(View::Emission), COLOR),
+            Self::Albedo => (LayerSource::View(View::Albedo), COLOR),
+            Self::Normal => (LayerSource::View(View::Normal), DIRECTION),
+            Self::Depth => (LayerSource::View(View::Depth), DISTANCE),
+            Self::Variance => (LayerSource::Film(variance), NUMBER),
+            Self::Samples => (LayerSource::Film(|state| state.film.image(Quantity::Samples)), NUMBER),
+            Self::Ambient => (LayerSource::View(View::Ambient), COLOR),
+            Self::Diffuse => (LayerSource::View(View::Diffuse), COLOR),
+            Self::Specular => (LayerSource::View(View::Specular), COLOR),
+            Self::Emission => (LayerSource::View(View::Emission), COLOR),
         }
     }
 
@@ -62,9 +62,9 @@ fn variance(state: &FilmState) -> RadianceImage {
     image
 }
 
-/// Returns the progress fractions at the begin and end of a layer. `None` is the image, which precedes layer 0.
-pub(crate) fn progress(layers: &[Layer], number: Option<usize>) -> [f64; 2] {
-    let work = |layers: &[Layer]| layers.iter().map(|layer| layer.work()).sum::<f64>();
+/// Returns the progress fractions at the start and end of a layer. `None` is the image, which precedes layer 0.
+pub(crate) fn progress(layers: &[OutputLayer], number: Option<usize>) -> [f64; 2] {
+    let work = |layers: &[OutputLayer]| layers.iter().map(|layer| layer.work()).sum::<f64>();
     let all = 1.0 + work(layers);
     match number {
         None => [0.0, 1.0 / all],
@@ -79,14 +79,14 @@ pub(crate) fn progress(layers: &[Layer], number: Option<usize>) -> [f64; 2] {
 pub(crate) fn layers(
     state: &FilmState,
     rendering: &Rendering<'_>,
-    layers: &[Layer],
+    layers: &[OutputLayer],
 ) -> Result<Vec<LayerImage>, Stop> {
     let mut images = Vec::with_capacity(layers.len());
     for (number, layer) in layers.iter().enumerate() {
         let (source, channels) = layer.source();
         let image = match source {
-            Source::Film(image) => image(state),
-            Source::View(view) => of_view(view, state, rendering, progress(layers, Some(number)))?,
+            LayerSource::Film(image) => image(state),
+            LayerSource::View(view) => of_view(view, state, rendering, progress(layers, Some(number)))?,
         };
         images.push(LayerImage { name: crate::choice::Choice::name(*layer), channels, image });
     }
@@ -107,7 +107,7 @@ fn of_view(
     plan.settings.render.samples = picture.film.samples().max;
     plan.time_seconds = None;
     let photons = rendering.photons.filter(|_| plan.settings.gathers());
-    let convergence = match photons.is_some_and(PhotonStore::are_sent) {
+    let convergence = match photons.is_some_and(PhotonStore::emits_photons) {
         true => Convergence::Photons,
         false => Convergence::Stratified,
     };
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn progress_spans_the_image_and_all_layers() {
-        let all = [Layer::Depth, Layer::Samples, Layer::Diffuse, Layer::Specular];
+        let all = [OutputLayer::Depth, OutputLayer::Samples, OutputLayer::Diffuse, OutputLayer::Specular];
         let ends: Vec<_> = [None, Some(0), Some(1), Some(2), Some(3)].map(|at| progress(&all, at)).to_vec();
         assert_eq!((ends[0][0], ends[4][1]), (0.0, 1.0));
         assert!(ends.windows(2).all(|two| two[0][1] == two[1][0]), "{ends:?}");

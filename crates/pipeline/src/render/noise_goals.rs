@@ -314,6 +314,6 @@ pub(crate) mod tests {
         assert!(error.max(own_error) < 0.004, "{error} {own_error}");
         // The noise target is 0.6.
         assert!((mean - 1.0).abs() < 0.04 * 0.6, "{mean} ± {error}");
-        assert!(own < 0.9, "stopping on own noise is biased: {own} ± {own_error}");
+        assert!(own < 0.9, "stopping on its own noise is biased: {own} ± {own_error}");
     }
 }

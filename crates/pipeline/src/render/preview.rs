@@ -19,14 +19,14 @@ const PATIENCE: Duration = Duration::from_millis(4);
 
 /// Destination and contents of previews.
 #[derive(Clone, Copy)]
-pub(crate) struct Screen<'a> {
+pub(crate) struct PreviewTarget<'a> {
     /// Maximum size of previews. `None` disables them.
     pub(crate) bounds: Option<PreviewSize>,
     pub(crate) plan: &'a Plan,
     pub(crate) sink: &'a Sink,
 }
 
-impl Screen<'_> {
+impl PreviewTarget<'_> {
     /// Returns the width and height of previews of the whole image.
     pub(crate) fn size(&self) -> Option<(u32, u32)> {
         let render = &self.plan.settings.render;

@@ -10,7 +10,7 @@ use super::film_state::{Before, FilmState};
 use super::first_picture::FirstPictures;
 use super::forecast::{Forecast, Moment};
 use super::noise_goals::LEAST;
-use super::preview::Screen;
+use super::preview::PreviewTarget;
 use super::share::Share;
 use super::time_budget::next_round;
 use crate::film::{PREPASS_SAMPLES, Prepass, Rect, TILE_SIZE, TileSamples};
@@ -63,7 +63,7 @@ pub(crate) struct Rendering<'a> {
 pub(crate) struct Scheduler<'a> {
     pub(crate) state: &'a mut FilmState,
     rendering: &'a Rendering<'a>,
-    screen: Screen<'a>,
+    screen: PreviewTarget<'a>,
     clock: Clock,
     forecast: Forecast,
     /// Pixels times samples so far.
@@ -92,7 +92,7 @@ impl<'a> Scheduler<'a> {
             is_first: !state.is_covered(),
             state,
             rendering,
-            screen: Screen { bounds, plan: rendering.plan, sink: rendering.sink },
+            screen: PreviewTarget { bounds, plan: rendering.plan, sink: rendering.sink },
             clock: Clock::start(),
             forecast,
             units,
@@ -206,7 +206,7 @@ impl<'a> Scheduler<'a> {
     fn judge_what_is_there(&mut self, part: Option<Rect>) {
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.samples_in(part, samples);
-        // Fewer samples decide nothing.
+        // With fewer samples, nothing is decided.
         if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
         }
@@ -247,7 +247,7 @@ impl<'a> Scheduler<'a> {
         let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None, 0) };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
             let samples = self.state.samples_in(part, target);
-            let at_once = samples..target.min(samples.saturating_add(photons.at_once()));
+            let at_once = samples..target.min(samples.saturating_add(photons.max_passes_at_once()));
             let numbers = self.state.numbers(at_once);
             let end = samples + numbers.len() as u32;
             // Do not trace or gather photons for which there is no time.

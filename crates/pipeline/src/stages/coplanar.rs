@@ -13,7 +13,7 @@ use crate::scene::fingerprint::Key;
 use crate::world::{Coplanar, coplanar_lights};
 
 /// Maximum number of lights with a warning.
-const MOST: usize = 10;
+const MAX_WARNINGS: usize = 10;
 
 /// Warns about lights that are moved off the plane of another surface. Reuses the search if shapes and lights are
 /// unchanged.
@@ -35,7 +35,7 @@ pub(crate) fn coplanar(
         let name = name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
         format!("the {}{name} of line {}", shape.kind(), loaded.line(span))
     };
-    for of_light in found.chunk_by(|a, b| a.light == b.light).take(MOST) {
+    for of_light in found.chunk_by(|a, b| a.light == b.light).take(MAX_WARNINGS) {
         let [Coplanar { light, surface, .. }, others @ ..] = of_light else { continue };
         let more = if others.is_empty() { String::new() } else { format!(" and {} more", others.len()) };
         let other = if surface == light { "other faces of its mesh".to_owned() } else { named(*surface) };

@@ -39,8 +39,8 @@ pub(crate) fn glass(
         Arc::new(GlassSolids::find(scene, &files, token)?)
     };
     memo.set(key, Arc::clone(&bodies));
-    findings.warnings.extend(warnings_of_open(loaded, bodies.open()));
-    findings.warnings.extend(bodies.flat().iter().map(|&object| warning_of_flat(loaded, object)));
+    findings.warnings.extend(open_glass_warnings(loaded, bodies.open()));
+    findings.warnings.extend(bodies.flat().iter().map(|&object| flat_glass_warning(loaded, object)));
     Ok(bodies)
 }
 
@@ -56,10 +56,10 @@ enum GlassFlaw {
 }
 
 /// Maximum number of objects that a warning names.
-const MOST_NAMES: usize = 5;
+const MAX_NAMES: usize = 5;
 
 /// Returns one warning per flaw, at the first object with it. Glass whose holes are covered by opaque surfaces is fine.
-fn warnings_of_open(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
+fn open_glass_warnings(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
     let mut groups: Vec<(GlassFlaw, Vec<&OpenGlass>)> = Vec::new();
     for open in open.iter().filter(|open| !open.is_covered) {
         let Some(flaw) = flaw(loaded, open) else { continue };
@@ -135,7 +135,7 @@ fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
         object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
     };
     // "1 more" would not be shorter than the last name.
-    let most = if members.len() == MOST_NAMES + 1 { MOST_NAMES + 1 } else { MOST_NAMES };
+    let most = if members.len() == MAX_NAMES + 1 { MAX_NAMES + 1 } else { MAX_NAMES };
     let mut shown: Vec<String> = members.iter().take(most).map(name).collect();
     let last = match members.len() - shown.len() {
         0 => shown.pop().unwrap_or_default(),
@@ -145,7 +145,7 @@ fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
 }
 
 /// Returns the warning about a closed mesh without a volume.
-fn warning_of_flat(loaded: &Loaded, object: u32) -> Diagnostic {
+fn flat_glass_warning(loaded: &Loaded, object: u32) -> Diagnostic {
     let object = &loaded.scene.objects[object as usize];
     let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
     let message =

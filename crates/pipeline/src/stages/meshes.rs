@@ -10,7 +10,7 @@ use super::super::cache::Pool;
 use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::canonical;
-use super::{Counts, Findings, LoadedAsset, Reading, Staged, Stop, loaded_and_kept};
+use super::{Counts, Findings, LoadedAsset, Reading, Staged, Stop, loading_result};
 use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::messages::{NO_EFFECT, NO_TEXTURE_COORDINATES};
@@ -76,7 +76,7 @@ pub(crate) fn meshes(
                 let load = |_: &Path, progress: Progress<'_>, token: &CancelToken| {
                     reading.containers.mesh((&file.value, file.part), progress, token)
                 };
-                one(file, content, kept, reading, load)
+                load_one(file, content, kept, reading, load)
             })
             .collect::<Result<_, _>>()
     })?;
@@ -123,7 +123,7 @@ pub(crate) fn meshes(
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
         findings.warnings.extend(loaded.lights_facing_away(bounds));
     }
-    Ok(loaded_and_kept(meshes, counts))
+    Ok(loading_result(meshes, counts))
 }
 
 /// Warns about objects that need data their mesh files lack. Files that could not be read are skipped.
@@ -183,7 +183,7 @@ fn name(file: &MeshFile) -> MeshName {
 }
 
 /// Loads one file, or returns the cached mesh if the file and all files it references are unchanged.
-fn one(
+fn load_one(
     file: &MeshFile,
     content: Content,
     kept: Option<Arc<CachedMesh>>,
@@ -225,7 +225,7 @@ fn one(
     Ok(LoadedAsset { files, result })
 }
 
-/// Whether a file that was missing when the mesh was loaded exists now, although this request had not looked at it.
+/// Whether a file that was missing while the mesh was loaded exists now, and this request has not seen it before.
 fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
     for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
         let is_new = reading.contents.known(&companion.path).is_none();
@@ -316,12 +316,12 @@ impl<'a> MeshWarnings<'a> {
 }
 
 /// Maximum number of warnings about all mesh files.
-const MOST_WARNINGS: usize = 100;
+const MAX_WARNINGS: usize = 100;
 
 fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
-    let unsaid = warnings.len().saturating_sub(MOST_WARNINGS);
+    let unsaid = warnings.len().saturating_sub(MAX_WARNINGS);
     let last = warnings.last().map(|(file, _)| file.span.clone());
-    for (file, message) in warnings.into_iter().take(MOST_WARNINGS) {
+    for (file, message) in warnings.into_iter().take(MAX_WARNINGS) {
         findings.warn(loaded, file.span.clone(), message);
     }
     if let Some(span) = last.filter(|_| unsaid > 0) {
@@ -469,8 +469,8 @@ mod tests {
         fixture.write("a.obj", &OBJ.replace("usemtl m\n", &names));
         let snapshot = fixture.snapshot();
         let warnings = fixture.find("[[mesh]]\nfile = \"a.obj\"\n", &snapshot).1.warnings;
-        assert_eq!(warnings.len(), MOST_WARNINGS + 1);
-        assert_eq!(warnings[MOST_WARNINGS].message, "2 more warnings about mesh files");
+        assert_eq!(warnings.len(), MAX_WARNINGS + 1);
+        assert_eq!(warnings[MAX_WARNINGS].message, "2 more warnings about mesh files");
     }
 
     #[test]
@@ -495,7 +495,7 @@ mod tests {
     }
 
     #[test]
-    fn material_file_changed_after_reading_is_noticed() {
+    fn material_file_changed_later_is_noticed() {
         let fixture = MeshFixture::new();
         let path = fixture.folder.path().join("a.obj");
         let file = MeshFile { value: path, span: 0..0, part: None };
@@ -515,7 +515,7 @@ mod tests {
         };
         let old = fixture.hash("a.mtl");
         let asset =
-            one(&file, fixture.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+            load_one(&file, fixture.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!((asset.files[1].content, mesh.mesh.materials[0].diffuse.x), (old, 1.0));
     }
@@ -541,7 +541,7 @@ mod tests {
             mesh
         };
         let asset =
-            one(&file, fixture.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
+            load_one(&file, fixture.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, fixture.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0);

@@ -49,7 +49,7 @@ impl Stop {
     }
 
     /// An invalid command line, which has no location in the scene.
-    pub(super) fn wrong_call(message: String, help: &str) -> Self {
+    pub(super) fn call_error(message: String, help: &str) -> Self {
         let (severity, help) = (Severity::Error, Some(help.to_owned()));
         let path = std::path::PathBuf::new();
         Self::Failed(Failure::Scene(vec![Diagnostic { severity, message, path, place: None, help }]))
@@ -116,7 +116,7 @@ impl Default for Findings {
 
 impl Findings {
     /// Resets everything except the start time of the request.
-    pub(super) fn start_again(&mut self) {
+    pub(super) fn reset(&mut self) {
         *self = Self { begun: self.begun, ..Self::default() };
     }
 
@@ -135,7 +135,7 @@ impl Findings {
 
     /// Adds files that may be missing. A scene may be broken because a file does not exist, so the text underlined by
     /// each error is watched as a file name.
-    pub(super) fn read_named(
+    pub(super) fn watch_underlined_files(
         &mut self,
         diagnostics: &[Diagnostic],
         scene: &Path,
@@ -157,7 +157,7 @@ impl Findings {
 
     /// Adds an error about an asset, at the place that references it.
     pub(super) fn asset_error(&mut self, loaded: &Loaded, span: Range<usize>, error: &AssetError) {
-        self.errors.push(at(loaded, span, Severity::Error, error.to_string()));
+        self.errors.push(diagnostic_at_span(loaded, span, Severity::Error, error.to_string()));
     }
 
     /// Adds an error about a mismatch between the scene and its assets.
@@ -166,7 +166,7 @@ impl Findings {
     }
 
     pub(super) fn warn(&mut self, loaded: &Loaded, span: Range<usize>, message: String) {
-        self.warnings.push(at(loaded, span, Severity::Warning, message));
+        self.warnings.push(diagnostic_at_span(loaded, span, Severity::Warning, message));
     }
 
     /// Takes all errors and warnings, errors first.
@@ -178,7 +178,12 @@ impl Findings {
 }
 
 /// Creates a diagnostic without help at a span of the scene file.
-fn at(loaded: &Loaded, span: Range<usize>, severity: Severity, message: String) -> Diagnostic {
+fn diagnostic_at_span(
+    loaded: &Loaded,
+    span: Range<usize>,
+    severity: Severity,
+    message: String,
+) -> Diagnostic {
     loaded.diagnostic_at(span, severity, message, None)
 }
 
@@ -191,7 +196,7 @@ pub(super) struct LoadedAsset<T> {
 }
 
 /// Reports a stage that loads files, with the numbers of loaded and cached ones.
-pub(super) fn loaded_and_kept<T>(value: T, counts: Counts) -> Staged<T> {
+pub(super) fn loading_result<T>(value: T, counts: Counts) -> Staged<T> {
     let Counts { loaded, kept, failed, left_out } = counts;
     if loaded + failed == 0 {
         return Staged::reused(value, reasons::UNCHANGED);

@@ -63,27 +63,27 @@ fn model_scene(
             if let Ok(content) = contents.read(&path, token) {
                 findings.read(FileRead { path: path.clone(), content });
             }
-            broken(&path, format!("cannot read it: {reason}"))
+            scene_error(&path, format!("cannot read it: {reason}"))
         }
         AssetError::Malformed { path, line, reason } => {
             let line = line.map_or(String::new(), |line| format!("line {line}: "));
-            broken(&path, format!("{line}{reason}"))
+            scene_error(&path, format!("{line}{reason}"))
         }
     })?;
     let loaded = scene::load_generated(made.text.as_str().into(), path, sets);
     let loaded = loaded.map_err(|errors| {
-        let shown = |one: Diagnostic| if one.path == path { model::in_its_scene(one) } else { one };
+        let shown = |one: Diagnostic| if one.path == path { model::in_generated_scene(one) } else { one };
         Stop::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
     })?;
     Ok((loaded, made))
 }
 
-fn broken(path: &Path, message: String) -> Stop {
-    Stop::Failed(Failure::Scene(vec![of_file(path, Severity::Error, message)]))
+fn scene_error(path: &Path, message: String) -> Stop {
+    Stop::Failed(Failure::Scene(vec![file_diagnostic(path, Severity::Error, message)]))
 }
 
 /// Creates a diagnostic about a whole file.
-fn of_file(path: &Path, severity: Severity, message: String) -> Diagnostic {
+fn file_diagnostic(path: &Path, severity: Severity, message: String) -> Diagnostic {
     Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
 }
 
@@ -102,7 +102,9 @@ pub(crate) fn parse(
     if let Held::Differs(held) = held::recover(path) {
         let help =
             Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
-        findings.warnings.push(Diagnostic { help, ..of_file(path, Severity::Warning, held::words(&held)) });
+        findings
+            .warnings
+            .push(Diagnostic { help, ..file_diagnostic(path, Severity::Warning, held::words(&held)) });
     }
     let content = contents.read(path, token)?;
     let is_model = is_model(path);
@@ -112,7 +114,7 @@ pub(crate) fn parse(
             Some(_) => "`--from` applies to models; a scene has its own camera",
             None => "`--up` applies to models; scenes are always y-up",
         };
-        return Err(Stop::Failed(Failure::Scene(vec![of_file(
+        return Err(Stop::Failed(Failure::Scene(vec![file_diagnostic(
             Path::new(""),
             Severity::Error,
             message.to_owned(),
@@ -142,7 +144,7 @@ pub(crate) fn parse(
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(Staged::reused(parsed, reasons::UNCHANGED));
     }
-    let named = named(&loaded);
+    let named = referenced_files(&loaded);
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
     // Do not keep a scene whose orbiter file could not be read, so that the next request tries again.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
@@ -164,7 +166,7 @@ fn read(
     let SceneSource { path, sets, .. } = origin;
     if !is_model(path) {
         let loaded = scene::load(path, sets)
-            .map_err(|errors| Stop::Failed(Failure::Scene(with_new_name(errors, path, last))))?;
+            .map_err(|errors| Stop::Failed(Failure::Scene(with_new_name_hint(errors, path, last))))?;
         let content = contents.decoded(path, *blake3::hash(loaded.source.text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     }
@@ -172,7 +174,7 @@ fn read(
     let content = contents.decoded(path, made.hash);
     let companions = made.companions.iter().map(|companion| contents.of_companion(companion, token));
     let companions = companions.collect::<Result<_, Cancelled>>()?;
-    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
+    let notes = made.notes.into_iter().map(|note| file_diagnostic(path, Severity::Warning, note)).collect();
     Ok((Arc::new(loaded), content, companions, notes))
 }
 
@@ -190,7 +192,11 @@ fn key(SceneSource { path, sets, show }: SceneSource<'_>, content: Content, is_m
 }
 
 /// Extends the error about a missing scene by the name of a file with the same text as the last valid scene.
-fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Parsed>>) -> Vec<Diagnostic> {
+fn with_new_name_hint(
+    mut errors: Vec<Diagnostic>,
+    path: &Path,
+    last: Option<&Arc<Parsed>>,
+) -> Vec<Diagnostic> {
     let last = last.filter(|last| last.loaded.path == path);
     if let [error] = &mut errors[..]
         && scene::is_absence(error)
@@ -204,7 +210,7 @@ fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Par
 }
 
 /// Returns the files that the scene references without the overrides, and the files that its unread meshes reference.
-fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
+fn referenced_files(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     // Unreadable files reference nothing.

@@ -23,11 +23,11 @@ use crate::scene::fingerprint::Key;
 use crate::world::World;
 
 /// Maximum memory of maps kept for later images.
-const MOST_KEPT_BYTES: usize = 128 << 20;
+const MAX_KEPT_BYTES: usize = 128 << 20;
 /// Maximum memory of further maps in use at once, except that one map may be larger.
-const MOST_ALIVE_BYTES: usize = 256 << 20;
+const MAX_ALIVE_BYTES: usize = 256 << 20;
 /// Maximum number of passes in use at once. Lookups in one map at a time use the CPU's caches better.
-const MOST_ALIVE: u32 = 1;
+const MAX_ALIVE: u32 = 1;
 /// Maximum number of samples at once without photons.
 const MAX_WITHOUT_TREE: u32 = 4096;
 
@@ -67,23 +67,23 @@ struct PhotonCounts {
 
 impl PhotonStore {
     /// Whether photons are traced at all, because some surface causes caustics.
-    pub(crate) fn are_sent(&self) -> bool {
+    pub(crate) fn emits_photons(&self) -> bool {
         self.photons.emits_photons()
     }
 
     /// Returns how many passes as large as the first may be in use at once.
-    pub(crate) fn at_once(&self) -> u32 {
-        if !self.are_sent() {
+    pub(crate) fn max_passes_at_once(&self) -> u32 {
+        if !self.emits_photons() {
             return MAX_WITHOUT_TREE;
         }
         let size = self.kept.borrow().first().map_or(1, |pass| pass.memory_bytes().max(1));
-        ((MOST_ALIVE_BYTES / size) as u32).clamp(1, MOST_ALIVE)
+        ((MAX_ALIVE_BYTES / size) as u32).clamp(1, MAX_ALIVE)
     }
 
     /// Average seconds to trace a pass. 0 if none was traced.
     pub(crate) fn seconds_of_pass(&self) -> f64 {
         let PhotonCounts { passes, seconds, .. } = self.sent.get();
-        if self.are_sent() && passes > 0 { seconds / passes as f64 } else { 0.0 }
+        if self.emits_photons() && passes > 0 { seconds / passes as f64 } else { 0.0 }
     }
 
     /// Returns the maps of some samples. `tick` is called regularly.
@@ -111,7 +111,7 @@ impl PhotonStore {
         sending: PhotonContext<'_>,
         tick: &mut impl FnMut(),
     ) -> Result<Arc<PhotonPass>, Cancelled> {
-        let number_kept = if self.are_sent() { number } else { 0 };
+        let number_kept = if self.emits_photons() { number } else { 0 };
         if let Some(pass) = self.kept.borrow().get(number_kept as usize) {
             return Ok(Arc::clone(pass));
         }
@@ -119,7 +119,7 @@ impl PhotonStore {
         let watch = Stopwatch::start(token);
         let photons = &self.photons;
         let settings = plan.settings.effective();
-        let pass = ticking(pool, tick, || photons.pass(world, &settings, number, token))?;
+        let pass = run_with_ticks(pool, tick, || photons.pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
         self.sent.set(PhotonCounts {
@@ -130,7 +130,7 @@ impl PhotonStore {
             seconds: sent.seconds + watch.seconds(),
             ..sent
         });
-        let has_room = self.kept_bytes() + pass.memory_bytes() <= MOST_KEPT_BYTES;
+        let has_room = self.kept_bytes() + pass.memory_bytes() <= MAX_KEPT_BYTES;
         let mut kept = self.kept.borrow_mut();
         if number as usize == kept.len() && (has_room || number == 0) {
             kept.push(Arc::clone(&pass));
@@ -163,7 +163,7 @@ impl PhotonStore {
 }
 
 /// Runs work in the pool and calls `tick` on this thread.
-fn ticking<T: Send>(
+fn run_with_ticks<T: Send>(
     pool: &ThreadPool,
     tick: &mut impl FnMut(),
     work: impl FnOnce() -> Result<T, Cancelled> + Send,
@@ -223,15 +223,15 @@ pub(crate) fn photons(
     let PhotonContext { world, pool, token, .. } = sending;
     let watch = Stopwatch::start(token);
     let send = |progress: Progress<'_>| {
-        ticking(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
+        run_with_ticks(pool, &mut tick, || Photons::new(world, &settings, of_photons, progress, token))
     };
     let (photons, first) = sending.sink.asset("photons", send)?;
     let seconds = watch.seconds();
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
     let sent = PhotonCounts { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
-    let are_sent = photons.emits_photons();
+    let emits_photons = photons.emits_photons();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
-    Ok(if are_sent { Staged::done((), "") } else { Staged::skipped((), reasons::NO_SPECULAR_SURFACES) })
+    Ok(if emits_photons { Staged::done((), "") } else { Staged::skipped((), reasons::NO_SPECULAR_SURFACES) })
 }

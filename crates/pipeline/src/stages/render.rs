@@ -28,7 +28,7 @@ pub(crate) fn render(
     let is_other = films.current().is_some_and(|current| current.key != key);
     films.select(key, |kept| !rendering.force && kept.has_at_most(wanted));
     if films.current().is_none() {
-        let convergence = match rendering.photons.is_some_and(PhotonStore::are_sent) {
+        let convergence = match rendering.photons.is_some_and(PhotonStore::emits_photons) {
             true => Convergence::Photons,
             false => Convergence::Stratified,
         };

@@ -13,7 +13,7 @@ use super::super::protocol::reasons;
 use super::super::watch::content::{Content, FileRead};
 use super::containers::{ImageInput, canonical};
 use super::meshes::Meshes;
-use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
+use super::{Counts, Findings, Reading, Staged, Stop, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
     ColorCurve, ImageEncoding, ImageLimits, ImageWithin, LoadedImage, coverage, load_hashed, load_within,
@@ -33,7 +33,7 @@ use crate::world::{
 };
 
 /// Maximum number of bytes of all texels of a scene.
-const MOST_BYTES: u64 = 2 << 30;
+const MAX_BYTES: u64 = 2 << 30;
 
 /// Canonical path of an image and how its values are interpreted.
 type TextureName = (PathBuf, Option<u32>, ImageEncoding, Option<Cutoff>);
@@ -173,7 +173,7 @@ pub(crate) fn textures(
     }
     let environment = environment_source(&loaded.scene);
     let images = images(needed, cache, reading)?;
-    let assets = load_all(&images, MOST_BYTES, reading);
+    let assets = load_all(&images, MAX_BYTES, reading);
     let mut counts = Counts::default();
     for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
         (image.content, image.linked) = contents;
@@ -205,9 +205,9 @@ pub(crate) fn textures(
                         textures.environment = Some((key, texels.clone()));
                     }
                 }
-                warn_of_unusable(loaded, &image, texels, findings);
-                warn_of_heights(loaded, &image, texels, findings);
-                warn_of_full_alpha(loaded, &image, texels, findings);
+                warn_about_unusable_pixels(loaded, &image, texels, findings);
+                warn_about_gray_normal_map(loaded, &image, texels, findings);
+                warn_about_opaque_alpha(loaded, &image, texels, findings);
                 for warning in &decoded.warnings {
                     findings.warn(loaded, place(loaded, image.asked_by[0]), warning.clone());
                 }
@@ -223,7 +223,7 @@ pub(crate) fn textures(
             Err(error) if !are_required && is_model(&loaded.path) => {
                 counts.failed += 1;
                 for one in &image.asked_by {
-                    show_without(loaded, one, &error, &mut textures.images, findings);
+                    substitute_texture(loaded, one, &error, &mut textures.images, findings);
                 }
             }
             Err(error) => {
@@ -246,12 +246,12 @@ pub(crate) fn textures(
         let message = format!("the environment map is black: none of its {size} pixels emits light");
         findings.warn(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
     }
-    Ok(loaded_and_kept(textures, Counts { left_out: *left_out, ..counts }))
+    Ok(loading_result(textures, Counts { left_out: *left_out, ..counts }))
 }
 
 /// Warns about an image that a model is shown without, and substitutes a constant. The material's factors then remain
 /// visible, except that emission is dropped. Materials of mesh files have their own values without a texture.
-fn show_without(
+fn substitute_texture(
     loaded: &Loaded,
     one: &NeededTexture,
     error: &AssetError,
@@ -292,7 +292,12 @@ fn show_without(
 }
 
 /// Warns about pixels that cannot be used.
-fn warn_of_unusable(loaded: &Loaded, image: &TextureRequest<'_>, texels: &Texels, findings: &mut Findings) {
+fn warn_about_unusable_pixels(
+    loaded: &Loaded,
+    image: &TextureRequest<'_>,
+    texels: &Texels,
+    findings: &mut Findings,
+) {
     let count = match texels.unusable {
         0 => return,
         1 => "1 pixel is".to_owned(),
@@ -305,7 +310,12 @@ fn warn_of_unusable(loaded: &Loaded, image: &TextureRequest<'_>, texels: &Texels
 }
 
 /// Warns about a gray normal map, which probably contains heights. A mesh file's own has no effect.
-fn warn_of_heights(loaded: &Loaded, image: &TextureRequest<'_>, texels: &Texels, findings: &mut Findings) {
+fn warn_about_gray_normal_map(
+    loaded: &Loaded,
+    image: &TextureRequest<'_>,
+    texels: &Texels,
+    findings: &mut Findings,
+) {
     let normals = image.asked_by.iter().find_map(|one| Some((one, one.normals_of.as_deref()?)));
     let Some((one, material)) = normals.filter(|_| texels.is_gray()) else { return };
     let effect = match one.mesh_file {
@@ -318,7 +328,12 @@ fn warn_of_heights(loaded: &Loaded, image: &TextureRequest<'_>, texels: &Texels,
 }
 
 /// Warns about an image used with `channel = "a"` whose alpha is 1 everywhere.
-fn warn_of_full_alpha(loaded: &Loaded, image: &TextureRequest<'_>, texels: &Texels, findings: &mut Findings) {
+fn warn_about_opaque_alpha(
+    loaded: &Loaded,
+    image: &TextureRequest<'_>,
+    texels: &Texels,
+    findings: &mut Findings,
+) {
     const ALPHA: PixelValue = PixelValue::Channel(Channel::Alpha);
     let is_alpha = |one: &&&NeededTexture| {
         matches!(one.source.encoding, ImageEncoding::Number { of: ALPHA, is_srgb: _ })

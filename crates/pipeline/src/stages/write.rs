@@ -42,7 +42,7 @@ pub(crate) struct WrittenFiles {
 
 impl WrittenFiles {
     /// Returns the first path that exists with a content that glimt did not write.
-    pub(crate) fn not_ours<'a>(&self, paths: &'a [PathBuf], contents: &Contents) -> Option<&'a Path> {
+    pub(crate) fn first_foreign<'a>(&self, paths: &'a [PathBuf], contents: &Contents) -> Option<&'a Path> {
         let holds = |path: &Path, known: &Content| {
             // This token is never cancelled.
             contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
@@ -209,7 +209,7 @@ fn write(
 
 /// Writes the image at the user's request even if it is on disk. Reports failures as events. Returns whether all
 /// outputs contain it.
-pub(crate) fn write_by_hand(state: &FilmState, to: Destination<'_>, written: &mut WrittenFiles) -> bool {
+pub(crate) fn write_on_request(state: &FilmState, to: Destination<'_>, written: &mut WrittenFiles) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
         to.sink.refused(conflicts);
@@ -234,7 +234,7 @@ pub(crate) struct Frames(Vec<(Picture, SampleStats)>);
 ///
 /// # Errors
 /// [`Stop::Cancelled`], or why a file could not be written.
-pub(crate) fn write_moving(
+pub(crate) fn write_animation(
     state: &FilmState,
     to: Destination<'_>,
     (turn, frames): (Turn, &mut Frames),

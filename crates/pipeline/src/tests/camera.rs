@@ -3,7 +3,7 @@
 use super::*;
 use crate::math::DVec3;
 use crate::messages;
-use crate::protocol::{CameraEdit, ImagePosition, Kept, MovedCamera, Picked};
+use crate::protocol::{CameraEdit, ImagePosition, KeptCamera, MovedCamera, Picked};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
 /// A mirror, and photons that it reflects.
@@ -98,12 +98,12 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
     }
 }
 
-fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<Kept, String> {
+fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<KeptCamera, String> {
     keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
 }
 
 /// Like [`keep`], for a camera that was moved from another one than the scene's.
-fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<Kept, String> {
+fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<KeptCamera, String> {
     match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),
@@ -217,7 +217,7 @@ fn missing_scene_file_is_reported() {
 }
 
 #[test]
-fn kept_camera_follows_links_and_keeps_permissions() {
+fn kept_camera_keeps_links_and_permissions() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let mut bench = Bench::new(SCENE);
     let real = bench.path("real.toml");

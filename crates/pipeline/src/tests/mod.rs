@@ -201,7 +201,7 @@ impl Bench {
     }
 
     pub(super) fn picture(&self) -> Vec<u8> {
-        fs::read(self.path("out.ppm")).expect("a picture")
+        fs::read(self.path("out.ppm")).expect("an image")
     }
 }
 

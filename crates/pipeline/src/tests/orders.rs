@@ -189,7 +189,7 @@ fn broken_file_does_not_stop_a_render() {
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
     let finished = |unchanged| LastGoodEnd::Finished { unchanged };
     assert_eq!(last_good_end(&bench, broken), finished(false));
-    // A further mistake finds it finished.
+    // After a second typo, the image is already finished.
     bench.edit("width = = 40", "width = = = 40");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
     assert_eq!(last_good_end(&bench, bench.generation), finished(true));
@@ -267,7 +267,7 @@ fn wide() -> String {
 fn samples_on_disk(bench: &Bench) -> String {
     let text = String::from_utf8_lossy(&bench.picture()).into_owned();
     let line = text.lines().find_map(|line| line.strip_prefix("# glimt:samples: "));
-    line.expect("the picture says so").to_owned()
+    line.expect("a sample count").to_owned()
 }
 
 #[test]

@@ -123,7 +123,7 @@ fn preview_without_photons_does_not_affect_film() {
         let mut bench = Bench::new(&wrapped(1000));
         bench.preview = preview;
         bench.done();
-        std::fs::read(bench.path("out.ppm")).expect("a picture")
+        std::fs::read(bench.path("out.ppm")).expect("an image")
     });
     pictures.sort();
     assert_eq!(pictures[0], pictures[1]);
@@ -131,14 +131,14 @@ fn preview_without_photons_does_not_affect_film() {
 
 #[test]
 fn maps_are_kept_while_there_is_room() {
-    const MOST: u64 = 128 << 20;
+    const MAX_BYTES: u64 = 128 << 20;
     let mut bench = Bench::new(&wrapped(1_000_000).replace("samples = 4", "samples = 8"));
     let report = bench.done().0.photons.expect("they are on");
     assert_eq!(report.passes, 8);
     let of_pass = report.used_memory_bytes;
-    assert!(8 * of_pass > MOST, "{of_pass} bytes per pass: all fit");
+    assert!(8 * of_pass > MAX_BYTES, "{of_pass} bytes per pass: all fit");
     let kept = report.kept_memory_bytes;
-    assert!(kept <= MOST && kept + of_pass > MOST, "{kept} bytes kept, {of_pass} per pass");
+    assert!(kept <= MAX_BYTES && kept + of_pass > MAX_BYTES, "{kept} bytes kept, {of_pass} per pass");
 }
 
 /// Whether the kernel below received photons.
@@ -163,7 +163,7 @@ fn black(
 fn kernel_is_used_with_photons() {
     let mut bench = Bench::with(&wrapped(1000), black);
     bench.done();
-    let picture = std::fs::read(bench.path("out.ppm")).expect("a picture");
+    let picture = std::fs::read(bench.path("out.ppm")).expect("an image");
     let bytes = picture.rsplitn(2, |byte| *byte == b'\n').next().expect("pixels");
     assert!(WITH.load(Ordering::SeqCst) && bytes.iter().all(|byte| *byte == 0));
 }

@@ -62,7 +62,7 @@ impl Content {
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
 /// Maximum number of bytes that are hashed, which covers the longest file that is decoded. Longer files are compared by
 /// their metadata, so that a sparse file of terabytes is not read.
-const MOST_HASHED: u64 = 4 << 30;
+const MAX_HASHED: u64 = 4 << 30;
 /// Bytes between two checks of the token.
 const CHUNK: usize = 1 << 20;
 
@@ -202,7 +202,7 @@ impl Contents {
         if let Some(content) = known {
             return Ok(content);
         }
-        let content = if stamp.len > MOST_HASHED { stamp.content() } else { self.hash(path, token)? };
+        let content = if stamp.len > MAX_HASHED { stamp.content() } else { self.hash(path, token)? };
         if stamp.is_settled(now) {
             self.known().insert(path.to_owned(), (stamp, content));
         } else {

@@ -27,7 +27,7 @@ use self::change_tracker::ChangeTracker;
 use self::content::{Content, Contents, FileRead};
 use self::folders::{Folders, Hint};
 use self::outputs::UnconfirmedChanges;
-pub use self::outputs::{Lost, OutputChange};
+pub use self::outputs::{ExternalChange, OutputChange};
 pub use self::working_folder::missing_folder;
 use crate::control::CancelToken;
 

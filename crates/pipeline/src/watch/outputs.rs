@@ -10,14 +10,14 @@ use crate::control::CancelToken;
 
 /// What another program did to a file that glimt wrote.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lost {
+pub enum ExternalChange {
     /// The file was removed.
     Removed,
     /// The file has another content.
     Replaced,
 }
 
-impl Lost {
+impl ExternalChange {
     /// Returns a predicate whose subject is the file name.
     pub fn words(self) -> &'static str {
         match self {
@@ -33,7 +33,7 @@ pub struct OutputChange {
     /// Path of the file.
     pub path: PathBuf,
     /// The change. `None` if the file has the content that glimt wrote.
-    pub lost: Option<Lost>,
+    pub lost: Option<ExternalChange>,
 }
 
 /// Written files by path, shared by the worker, which writes them, and the watcher.
@@ -48,7 +48,7 @@ struct Output {
     writes: u64,
     is_being_written: bool,
     /// The last reported change.
-    reported: Option<Lost>,
+    reported: Option<ExternalChange>,
 }
 
 impl Outputs {
@@ -84,7 +84,7 @@ impl Outputs {
     }
 
     /// Returns the files that no longer have the content that glimt wrote.
-    pub fn lost(&self, contents: &Contents) -> Vec<(PathBuf, Lost)> {
+    pub fn lost(&self, contents: &Contents) -> Vec<(PathBuf, ExternalChange)> {
         let found = self.states(contents).into_iter();
         found.filter_map(|(path, _, lost)| Some((path, lost?))).collect()
     }
@@ -96,7 +96,7 @@ impl Outputs {
     }
 
     /// Returns the reported and the current state of each file that is not being written.
-    fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<Lost>, Option<Lost>)> {
+    fn states(&self, contents: &Contents) -> Vec<(PathBuf, Option<ExternalChange>, Option<ExternalChange>)> {
         let before: Vec<(PathBuf, Output)> = {
             let known = self.known();
             let idle = known.iter().filter(|(_, output)| !output.is_being_written);
@@ -107,8 +107,8 @@ impl Outputs {
             let now = contents.read(&path, &CancelToken::new()).unwrap_or(Content::Missing);
             let lost = match now {
                 now if now == output.content => None,
-                Content::Missing => Some(Lost::Removed),
-                Content::Hash(_) | Content::Unusable(_) => Some(Lost::Replaced),
+                Content::Missing => Some(ExternalChange::Removed),
+                Content::Hash(_) | Content::Unusable(_) => Some(ExternalChange::Replaced),
             };
             // Ignore the content if a write has begun since.
             let is_current = self.known().get(&path).is_some_and(|now| now.writes == output.writes);
@@ -196,18 +196,24 @@ mod tests {
         assert_eq!(look(&contents, 5000), []);
         fs::write(&path, "of another").expect("written");
         assert_eq!(look(&contents, 5300), [], "the file may be incomplete");
-        assert_eq!(look(&contents, 5600), [Some(Lost::Replaced)]);
+        assert_eq!(look(&contents, 5600), [Some(ExternalChange::Replaced)]);
         fs::write(&path, "of another again").expect("written");
         assert_eq!((look(&contents, 6000), look(&contents, 7000)), (vec![], vec![]), "once");
-        assert_eq!(contents.outputs.lost(&contents), [(path.clone(), Lost::Replaced)]);
+        assert_eq!(contents.outputs.lost(&contents), [(path.clone(), ExternalChange::Replaced)]);
         fs::remove_file(&path).expect("removed");
-        assert_eq!((look(&contents, 8000), look(&contents, 9000)), (vec![], vec![Some(Lost::Removed)]));
+        assert_eq!(
+            (look(&contents, 8000), look(&contents, 9000)),
+            (vec![], vec![Some(ExternalChange::Removed)])
+        );
         // Restore the file.
         fs::write(&path, "two").expect("written");
         assert_eq!((look(&contents, 10_000), look(&contents, 11_000)), (vec![], vec![None]));
         // Let glimt write the file again.
         fs::remove_file(&path).expect("removed");
-        assert_eq!((look(&contents, 12_000), look(&contents, 13_000)), (vec![], vec![Some(Lost::Removed)]));
+        assert_eq!(
+            (look(&contents, 12_000), look(&contents, 13_000)),
+            (vec![], vec![Some(ExternalChange::Removed)])
+        );
         write(&contents, &path, "three");
         assert_eq!((look(&contents, 14_000), look(&contents, 15_000)), (vec![], vec![]));
     }
@@ -222,7 +228,7 @@ mod tests {
         contents.outputs.end(&path, None);
         assert_eq!(contents.outputs.lost(&contents), []);
         fs::remove_file(&path).expect("removed");
-        assert_eq!(contents.outputs.lost(&contents), [(path, Lost::Removed)]);
+        assert_eq!(contents.outputs.lost(&contents), [(path, ExternalChange::Removed)]);
         // A file that was never written is not watched.
         let other = folder.path().join("b.png");
         contents.outputs.begin(&other);

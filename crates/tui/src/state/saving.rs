@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::request::Toggles;
 use crate::event::WriteFailure;
-use crate::options::Lost;
+use crate::options::ExternalChange;
 use crate::pipeline::protocol::{CameraEdit, OwnState, Viewpoint};
 
 /// A save that is not on the screen yet.
@@ -37,7 +37,7 @@ pub(crate) struct WrittenFile {
     /// Whether a later image could not be written there, so the content is unknown.
     pub is_stale: bool,
     /// Change of the file by another program.
-    pub lost: Option<Lost>,
+    pub lost: Option<ExternalChange>,
 }
 
 /// Saves of scene files, and written images.

@@ -184,7 +184,7 @@ fn command_line_exposure_is_no_change() {
 
 #[test]
 fn model_scene_is_written_once() {
-    use crate::pipeline::protocol::{Event as WorkerEvent, Kept};
+    use crate::pipeline::protocol::{Event as WorkerEvent, KeptCamera};
     let mut ui = TestUi::new();
     ui.state.request.scene = "assets/vase.obj".into();
     ui.finish([200, 30, 30]);
@@ -193,7 +193,7 @@ fn model_scene_is_written_once() {
     ui.key(KeyPress::special(KeyCode::Esc));
     assert!(ui.text().contains("c keep") && !ui.text().contains("o edit"), "{}", ui.text());
     let kept =
-        Kept { path: "assets/vase.toml".into(), is_new: true, is_own: false, of_model: true, edit: None };
+        KeptCamera { path: "assets/vase.toml".into(), is_new: true, is_own: false, of_model: true, edit: None };
     let generation = ui.state.request.generation;
     ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     ui.key(KeyPress::special(KeyCode::Esc));

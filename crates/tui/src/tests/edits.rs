@@ -5,7 +5,7 @@ use crate::Changed;
 use crate::event::{Event, FrameReport};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, Kept, LastGoodEnd, PreviewSource, Stage, Status};
+use crate::pipeline::protocol::{self, KeptCamera, LastGoodEnd, PreviewSource, Stage, Status};
 use crate::pipeline::settings::Effective;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Fingerprint;
@@ -374,7 +374,7 @@ fn new_model_scene_is_not_undone() {
     let mut ui = TestUi::new();
     ui.finish(RED);
     let (path, edit) = ("assets/knot.toml".into(), None);
-    let kept = Kept { path, is_new: true, is_own: false, of_model: true, edit };
+    let kept = KeptCamera { path, is_new: true, is_own: false, of_model: true, edit };
     ui.worker(protocol::Event::CameraKept { generation: 1, outcome: Ok(kept) });
     ui.press('u');
     let words = messages::NEW_SCENE_STAYS;

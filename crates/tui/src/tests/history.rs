@@ -7,7 +7,7 @@ use crate::Changed;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{Command, Event as WorkerEvent, Kept, Picked};
+use crate::pipeline::protocol::{Command, Event as WorkerEvent, KeptCamera, Picked};
 
 /// A beauty image, then one with hard shadows in the view of normals; the beauty image is open.
 fn older() -> TestUi {
@@ -85,7 +85,7 @@ fn c_keeps_the_newest_camera() {
         if is_noticed {
             ui.event(Event::Changed(crate::Changed { noticed: ui.now }));
         }
-        let kept = Kept { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
+        let kept = KeptCamera { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
         let generation = ui.state.request.generation;
         ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
         let words = messages::OF_NEWEST_RENDER.trim_end();

@@ -8,7 +8,7 @@ use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, CameraEdit, Command, Kept, Picked, Section, ImagePosition, Thing, Writing};
+use crate::pipeline::protocol::{self, CameraEdit, Command, KeptCamera, Picked, Section, ImagePosition, PickedObject, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
@@ -37,8 +37,8 @@ fn asked(effects: &[Effect]) -> ImagePosition {
     }
 }
 
-fn thing() -> Thing {
-    Thing {
+fn thing() -> PickedObject {
+    PickedObject {
         shape: "sphere",
         name: Some("ball".to_owned()),
         path: "scenes/cornell.toml".into(),
@@ -52,7 +52,7 @@ fn thing() -> Thing {
     }
 }
 
-fn answer(ui: &mut TestUi, thing: Option<Thing>) -> Vec<Effect> {
+fn answer(ui: &mut TestUi, thing: Option<PickedObject>) -> Vec<Effect> {
     let picked = Box::new(Picked { pixel: [1, 2], thing, color: Some([0.5; 3]) });
     ui.worker(protocol::Event::Picked { generation: 0, picked })
 }
@@ -140,7 +140,7 @@ fn click_after_f_sets_the_focus() {
 
 fn kept(ui: &mut TestUi, is_new: bool, is_own: bool) -> Vec<Effect> {
     let outcome =
-        Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
+        Ok(KeptCamera { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
     ui.worker(protocol::Event::CameraKept { generation: 0, outcome })
 }
 
@@ -184,7 +184,7 @@ fn u_undoes_until_nothing_is_left() {
     assert!(ui.text().contains(messages::NOTHING_TO_UNDO), "{}", ui.text());
     let edit = |after: &str| CameraEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
     for after in ["one", "two"] {
-        let kept = Kept {
+        let kept = KeptCamera {
             path: "a.toml".into(),
             is_new: true,
             is_own: true,

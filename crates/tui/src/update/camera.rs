@@ -8,7 +8,7 @@ use super::request::render;
 use crate::camera::{dollied, orbited, zoomed};
 use crate::event::Effect;
 use crate::messages;
-use crate::pipeline::protocol::{Command, Kept, MovedCamera};
+use crate::pipeline::protocol::{Command, KeptCamera, MovedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
 use crate::scene::is_mesh;
@@ -130,8 +130,8 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
 }
 
 /// Handles the outcome of keeping the camera. A camera that is now in the file no longer counts as moved.
-pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
-    let Kept { path, is_new, is_own, of_model, edit } = match outcome {
+pub(super) fn kept(state: &mut State, outcome: Result<KeptCamera, String>) -> Vec<Effect> {
+    let KeptCamera { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);

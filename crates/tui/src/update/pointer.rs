@@ -7,7 +7,7 @@ use crate::event::{Effect, Mouse, MouseKind};
 use crate::keymap::OverlayAction;
 use crate::math::decimal::{decimal_step, rounded};
 use crate::messages;
-use crate::pipeline::protocol::{Command, Picked, Thing};
+use crate::pipeline::protocol::{Command, Picked, PickedObject};
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::state::{PickPurpose, Press, State};
@@ -202,7 +202,7 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let Some(thing) = thing else {
         return [format!("nothing at pixel {x}, {y}")].into_iter().chain(light).collect();
     };
-    let Thing { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
+    let PickedObject { shape, name, path, line, material, position, normal, is_front, distance, .. } = thing;
     let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
@@ -235,7 +235,7 @@ mod tests {
 
     #[test]
     fn inspected_values_are_short() {
-        let thing = Thing {
+        let thing = PickedObject {
             shape: "sphere",
             name: Some("ball".to_owned()),
             path: "scenes/still.toml".into(),
@@ -260,7 +260,8 @@ mod tests {
                 "normal (0, 1, 0)"
             ]
         );
-        let of_model = picked.thing.clone().map(|thing| Thing { path: "scenes/vase.obj".into(), ..thing });
+        let of_model =
+            picked.thing.clone().map(|thing| PickedObject { path: "scenes/vase.obj".into(), ..thing });
         let of_model = facts(&Picked { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "models have no lines");
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);

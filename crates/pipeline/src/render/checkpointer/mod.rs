@@ -144,7 +144,7 @@ impl<'a> Checkpointer<'a> {
             return Ok(true);
         };
         if resume == Resume::Asked {
-            return Err(Stop::wrong_call(
+            return Err(Stop::call_error(
                 format!("--resume: {error}"),
                 "remove --resume to start over, or name another file with -o",
             ));
@@ -180,7 +180,7 @@ impl<'a> Checkpointer<'a> {
         }
         let refused = |error: PartError| {
             let remedy = messages::REMOVE_RESUME;
-            Err(Stop::wrong_call(format!("--resume: {error}"), remedy))
+            Err(Stop::call_error(format!("--resume: {error}"), remedy))
         };
         if !differences.is_empty() {
             return refused(PartError::Other { path, other: "this call".to_owned(), differences });
@@ -324,7 +324,7 @@ impl<'a> Checkpointer<'a> {
     pub(crate) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
         let is_kept = match (self.around.interruption)() {
             Interruption::Replaced => false,
-            // Update an existing checkpoint even after a short time.
+            // Update an existing checkpoint even if the render was short.
             Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
             Interruption::Ended => true,
         };

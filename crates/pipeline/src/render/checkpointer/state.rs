@@ -54,11 +54,11 @@ impl State {
     /// Whether a render can produce these numbers. Others would overflow sums or never end the render.
     pub(super) fn is_possible(&self) -> bool {
         /// About 30,000 years.
-        const MOST_SECONDS: f64 = 1e12;
-        const MOST_RAYS: u64 = 1 << 56;
-        let is_time = |seconds: f64| (0.0..=MOST_SECONDS).contains(&seconds);
+        const MAX_SECONDS: f64 = 1e12;
+        const MAX_RAYS: u64 = 1 << 56;
+        let is_time = |seconds: f64| (0.0..=MAX_SECONDS).contains(&seconds);
         let sum = |rays: &[u64]| rays.iter().try_fold(0_u64, |sum, rays| sum.checked_add(*rays));
-        let have_rays = |rays: &[u64]| sum(rays).is_some_and(|sum| sum <= MOST_RAYS);
+        let have_rays = |rays: &[u64]| sum(rays).is_some_and(|sum| sum <= MAX_RAYS);
         is_time(self.seconds)
             && is_time(self.processor_seconds)
             && self.brightness.is_none_or(|brightness| brightness.is_finite() && brightness >= 0.0)

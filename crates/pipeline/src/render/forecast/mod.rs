@@ -185,7 +185,7 @@ fn expectation(moment: &Moment<'_>) -> Expectation {
     let begin = Instant::now();
     let is_known = !(error > 0.0) || state.is_foreseen();
     let pixels = state.film.crop().area();
-    let at_once = photons.map_or(u32::MAX, PhotonStore::at_once);
+    let at_once = photons.map_or(u32::MAX, PhotonStore::max_passes_at_once);
     let jobs = |done, end| remaining_jobs(done, end, pixels, at_once);
     let total = is_known.then(|| state.seconds() + state.seconds_to_come(most, jobs));
     let passes = photons.map_or([0; 2], |_| state.passes(most));

@@ -61,7 +61,7 @@ fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Opti
     let Work { done, aside: [aside, _], .. } = work;
     let level = level_below(by_now / STEP);
     let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
-    // Time spent aside continues at its current share.
+    // Assume that other things keep their current share of the time.
     let seconds = more / rate * (1.0 + aside * rate / done);
     (level > 0.0 && seconds <= left).then_some((level, seconds))
 }
@@ -101,7 +101,7 @@ mod tests {
         let (level, seconds) = told.next.expect("a level");
         assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
         assert_eq!((told.now, told.seconds), (0.021, 9.0));
-        // Time aside equals the time at work.
+        // Half of the time is spent on other things.
         let half = Work { aside: [10.0, 10.0], ..work };
         let (_, seconds) =
             measured().at(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");

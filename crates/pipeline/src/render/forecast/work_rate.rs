@@ -49,7 +49,7 @@ impl WorkRate {
             self.measured = (seconds, done);
         }
         let Some(total) = total else { return (self.fraction, None) };
-        // Convert the time aside to work.
+        // Count the time spent on other things as work.
         let rate = self.rate.unwrap_or(0.0);
         let all = total + rate * (aside + aside_to_come);
         let fraction = if all > 0.0 { (done + rate * aside) / all } else { 0.0 };
@@ -62,14 +62,14 @@ impl WorkRate {
 mod tests {
     use super::*;
 
-    /// Creates work without time aside.
+    /// Creates work without time spent on other things.
     fn of(done: f64, total: f64) -> Work {
         Work { done, total: Some(total), aside: [0.0; 2] }
     }
 
     #[test]
-    fn time_aside_counts_separately() {
-        // Two seconds aside and one at work for 100 of 400.
+    fn other_time_counts_separately() {
+        // Two seconds on other things and one second of work for 100 of 400 units.
         let mut pace = WorkRate::new(0.0);
         let work = Work { done: 100.0, total: Some(400.0), aside: [2.0, 6.0] };
         let (fraction, eta) = pace.at(3.0, work);
