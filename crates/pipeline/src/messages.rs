@@ -22,21 +22,9 @@ pub const CLAMP_EFFECT: &str =
     "limits indirect light: fewer fireflies, but a biased image that is slightly too dark";
 /// Effect of the default `clamp` of models.
 pub const CLAMP_EFFECT_ON_MODELS: &str = "limits light from shiny surfaces (fewer fireflies, slightly dark)";
-/// Effect of an integrator that cannot find some caustics.
-pub const CAUSTICS_MISSING: &str = "path does not find light from a [[light]] without size through mirrors or glass: \
-                                    their caustics are missing";
-
-/// Returns the help for a warning that a command line option causes.
-pub fn caused_by(option: &str) -> String {
-    format!("caused by `{option}`, not by the scene")
-}
 
 /// A file in place of a checkpoint has another format.
 pub const NOT_A_CHECKPOINT: &str = "is not a checkpoint";
-/// Another process uses a checkpoint.
-pub const CHECKPOINT_IN_USE: &str = "another running glimt uses";
-/// Help for `--resume` with a part of another render.
-pub const REMOVE_RESUME: &str = "remove --resume to replace it, or name another file with -o";
 /// A file is damaged.
 pub const DAMAGED: &str = "damaged";
 /// The camera of the scene file was not restored.
@@ -45,16 +33,6 @@ pub const NOT_UNDONE: &str = "has changed since c: not undone";
 pub const MODEL_MISSING: &str = "does not exist: its scene was not written";
 /// A new file would replace an existing one.
 pub const ALREADY_EXISTS: &str = "already exists";
-/// A model is rendered without a texture.
-pub const SHOWN_WITHOUT: &str = "without it";
-/// A key of a mesh or material does not change the image.
-pub const NO_EFFECT: &str = "has no effect";
-/// A mesh file lacks texture coordinates.
-pub const NO_TEXTURE_COORDINATES: &str = "has no texture coordinates";
-/// A normal map probably contains heights.
-pub const GRAY_NORMAL_MAP: &str = "is gray and probably contains heights";
-/// Two outputs are links to the same file.
-pub const SAME_FILE: &str = "are the same file";
 
 /// Returns why a checkpoint with more than `samples` samples per pixel is not used.
 pub fn has_more_samples(samples: u32) -> String {

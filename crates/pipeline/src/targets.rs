@@ -9,7 +9,6 @@ use super::plan::{NamedBy, Plan};
 use super::render::checkpointer::path_of as checkpoint_of;
 use super::report::ReportMarks;
 use super::sink::Sink;
-use crate::messages::SAME_FILE;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{FolderSweep, Guard};
 use crate::output::{
@@ -176,8 +175,8 @@ fn input_error(plan: &Plan, target: OutputTarget<'_>, input: &Input) -> Diagnost
 fn same_file_error(plan: &Plan, target: OutputTarget<'_>, twin: &Path) -> Diagnostic {
     let (name, twin) = (target.path.display(), twin.display());
     let message = match target.kind {
-        TargetKind::Picture(_) => format!("the outputs {twin} and {name} {SAME_FILE}"),
-        TargetKind::Report => format!("the image {twin} and the report {name} {SAME_FILE}"),
+        TargetKind::Picture(_) => format!("the outputs {twin} and {name} are the same file"),
+        TargetKind::Report => format!("the image {twin} and the report {name} are the same file"),
     };
     call_error(message, Some(format!("use separate files: {}", remedy(plan, target.kind))))
 }

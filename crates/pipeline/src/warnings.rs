@@ -6,7 +6,7 @@ use super::plan::MAX_PHOTONS;
 use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
-use crate::messages::{CAUSTICS_MISSING, CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS, caused_by};
+use crate::messages::{CLAMP_EFFECT, CLAMP_EFFECT_ON_MODELS};
 use crate::scene::description::{MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{Loaded, is_model};
@@ -36,7 +36,7 @@ pub(super) fn settings_warnings(
 fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides) -> Diagnostic {
     let severity = Severity::Warning;
     if let Some(option) = cause.option(overrides) {
-        let help = Some(caused_by(&option));
+        let help = Some(format!("caused by `{option}`, not by the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
     }
     if cause == Cause::Clamp && is_model(&loaded.path) {
@@ -89,7 +89,8 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let mut warnings = Vec::new();
     let is_sharp_any = scene.lights.iter().any(|light| light.sends() && light.is_sharp());
     if finds_all_light && is_sharp_any && has(&keeps_direction) {
-        let message = CAUSTICS_MISSING;
+        let message = "path does not find light from a [[light]] without size through mirrors or glass: their caustics \
+                       are missing";
         warnings.push((Cause::Integrator, message.to_owned()));
     }
     if photons.is_some()

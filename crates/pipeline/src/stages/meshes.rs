@@ -13,7 +13,6 @@ use super::containers::canonical;
 use super::{Counts, Findings, LoadedAsset, Reading, Staged, Stop, loading_result};
 use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::messages::{NO_EFFECT, NO_TEXTURE_COORDINATES};
 use crate::scene::description::{MeshFile, Scene, UvSet};
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, MeshBounds};
@@ -142,10 +141,10 @@ fn warn_about_missing_parts(
         let material = object.material.map(|material| &loaded.scene.materials[material]);
         let mut warn = |message| findings.warn(loaded, object.span.clone(), message);
         if mesh.vertex_colors && read.colors.is_empty() {
-            warn(format!("`vertex_colors` {NO_EFFECT}: the vertices of {file} have no colors"));
+            warn(format!("`vertex_colors` has no effect: the vertices of {file} have no colors"));
         } else if let Some(material) = material.filter(|own| mesh.vertex_colors && !own.kind.has_color()) {
             let name = &material.name;
-            warn(format!("`vertex_colors` {NO_EFFECT}: material \"{name}\" has no color to multiply"));
+            warn(format!("`vertex_colors` has no effect: material \"{name}\" has no color to multiply"));
         }
         let Some(material) = material else { continue };
         let name = &material.name;
@@ -164,12 +163,12 @@ fn warn_about_missing_parts(
         }
         if material.kind.has_direction() {
             warn(format!(
-                "{file} {NO_TEXTURE_COORDINATES}, which the `anisotropy` of \"{name}\" needs for its direction"
+                "{file} has no texture coordinates, which the `anisotropy` of \"{name}\" needs for its direction"
             ));
         }
         if !material.textures().is_empty() {
             warn(format!(
-                "{file} {NO_TEXTURE_COORDINATES}: each triangle shows half of every texture of \"{name}\""
+                "{file} has no texture coordinates: each triangle shows half of every texture of \"{name}\""
             ));
         }
     }

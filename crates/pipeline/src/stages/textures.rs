@@ -23,7 +23,6 @@ use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::Vec3;
-use crate::messages;
 use crate::scene::description::{Channel, Encoding, PixelValue, Scene, TextureRole};
 use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, Key};
@@ -260,7 +259,7 @@ fn substitute_texture(
 ) {
     let file = loaded.path.display();
     let mut warn = |material: &str| {
-        let help = format!("glimt shows the material \"{material}\" of {file} {}", messages::SHOWN_WITHOUT);
+        let help = format!("glimt shows the material \"{material}\" of {file} without it");
         let warning =
             loaded.diagnostic_at(place(loaded, one), Severity::Warning, error.to_string(), Some(help));
         if !findings.warnings.contains(&warning) {
@@ -319,11 +318,12 @@ fn warn_about_gray_normal_map(
     let normals = image.asked_by.iter().find_map(|one| Some((one, one.normals_of.as_deref()?)));
     let Some((one, material)) = normals.filter(|_| texels.is_gray()) else { return };
     let effect = match one.mesh_file {
-        Some(_) => "it has no effect (use `bump` for heights)",
+        Some(_) => "it does not change the normals (use `bump` for heights)",
         None => "it tilts all normals to one side (use `bump` for heights)",
     };
     let path = image.path().display();
-    let message = format!("the normal map {path} of \"{material}\" {}: {effect}", messages::GRAY_NORMAL_MAP);
+    let message =
+        format!("the normal map {path} of \"{material}\" is gray and probably contains heights: {effect}");
     findings.warn(loaded, place(loaded, one), message);
 }
 

@@ -179,7 +179,7 @@ impl<'a> Checkpointer<'a> {
             differences.push("the output settings differ".to_owned());
         }
         let refused = |error: PartError| {
-            let remedy = messages::REMOVE_RESUME;
+            let remedy = "remove --resume to replace it, or name another file with -o";
             Err(Stop::call_error(format!("--resume: {error}"), remedy))
         };
         if !differences.is_empty() {
@@ -446,7 +446,7 @@ fn is_finished_part(path: &Path) -> String {
 }
 
 fn held_by_another(path: &Path) -> String {
-    format!("{} {}; name another file with -o", messages::CHECKPOINT_IN_USE, path.display())
+    format!("another running glimt uses {}; name another file with -o", path.display())
 }
 
 /// Returns why a file is not used, without its name.
