@@ -77,8 +77,8 @@ pub(crate) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Returns the key of all lights: emission, position and object. `sky` is the key of the environment map, `patterns` are the
-/// keys of the textures on emitters.
+/// Returns the key of all lights: emission, position and object. `sky` is the key of the environment map, `patterns`
+/// are the keys of the textures on emitters.
 pub(crate) fn lights(
     scene: &Scene,
     of: &Referents<'_>,

@@ -2,7 +2,9 @@
 //!
 //! [`start`] returns a [`Handle`], which takes commands and provides events and a slot with the latest preview.
 //! `engine` runs the stages of one request; `stages` has one file per stage, and `render` contains the render loop.
-//! Each stage compares a [fingerprint](crate::scene::fingerprint) of its inputs (`keys`) with the fingerprint of its cached value (`cache`), and reports whether it was done, reused or skipped. [`watch`] reports files whose content has changed.
+//! Each stage compares a [fingerprint](crate::scene::fingerprint) of its inputs (`keys`) with the fingerprint of its
+//! cached value (`cache`), and reports whether it was done, reused or skipped. [`watch`] reports files whose content
+//! has changed.
 
 mod answers;
 mod assembly;

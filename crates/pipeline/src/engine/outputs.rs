@@ -93,8 +93,8 @@ impl Engine {
         Ok(())
     }
 
-    /// Writes the report of an image that the user has written with a key. If its render is not finished, removes an older
-    /// report.
+    /// Writes the report of an image that the user has written with a key. If its render is not finished, removes an
+    /// older report.
     fn report_written_image(&self, sink: &Sink) {
         let Some(plan) = &self.plan else { return };
         let Some(report) = &self.report else { return drop_report(plan, &self.inputs, sink) };

@@ -89,8 +89,8 @@ impl Engine {
         self.own = Some(own);
     }
 
-    /// Checks the memory of a request. If keys show another image, the film of the scene's own image is included. If both do not fit,
-    /// the own film makes room once its image is written.
+    /// Checks the memory of a request. If keys show another image, the film of the scene's own image is included. If
+    /// both do not fit, the own film makes room once its image is written.
     ///
     /// # Errors
     /// The request needs more memory than available.

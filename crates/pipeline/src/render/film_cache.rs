@@ -49,7 +49,8 @@ impl FilmCache {
         self.pinned = None;
     }
 
-    /// Limits the size of the cached films, apart from the current and the pinned one, and evicts films above the limit.
+    /// Limits the size of the cached films, apart from the current and the pinned one, and evicts films above the
+    /// limit.
     pub(crate) fn limit(&mut self, bytes: u64) {
         self.most_kept_bytes = bytes.min(MAX_KEPT_BYTES);
         self.make_room(0);

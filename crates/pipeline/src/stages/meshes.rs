@@ -61,7 +61,8 @@ pub(crate) fn meshes(
             let name = name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
-                // Hash the files that the mesh referenced before they are read, because it most likely references them again.
+                // Hash the files that the mesh referenced before they are read, because it most likely references them
+                // again.
                 companions(&last.companions, reading)?;
             }
             Ok((content, cache.get(&name, file_key(file, content))))
