@@ -4,6 +4,7 @@ use ::image::{DynamicImage, ImageBuffer, Rgba};
 
 use super::*;
 use crate::assets::image::convert;
+use crate::assets::image::facts::Alpha;
 use crate::materials::Channel;
 use crate::math::Vec4;
 
