@@ -259,7 +259,7 @@ mod tests {
             Err(Stop::Failed(Failure::Work(said))) => said,
             other => panic!("{other:?}"),
         };
-        for fact in [" 42 MiB ", " 8 MiB of the control group (x); ", "--memory 1GiB"] {
+        for fact in [" 41 MiB ", " 8 MiB of the control group (x); ", "--memory 1GiB"] {
             assert!(said.contains(fact), "{fact}: {said}");
         }
         assert!(check(&Overrides { memory: Some(1 << 30), ..Overrides::default() }).is_ok());
