@@ -319,7 +319,8 @@ fn nested_spheres_are_searched_in_logarithmic_time() {
                     around.push(object);
                 }
             });
-            assert!(found <= 4 * count.ilog2() as usize, "{found} of {count}");
+            let bound = MAX_INTERIORS * (count.ilog2() as usize + 4);
+            assert!(found <= bound, "{found} of {count}");
             // Those that determine the medium are among them.
             let glasses = world.closed_glasses().map(|(object, _)| object);
             let enclosing = glasses.filter(|object| world.encloses(*object, sides.beyond));
