@@ -13,6 +13,7 @@ use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
 use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
+use crate::system::folder;
 
 /// Hint after errors about files that are not scenes.
 pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
@@ -196,33 +197,30 @@ pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 
 /// The file with the most similar name in the folder of a missing file, among those that `may_be_meant` accepts.
 pub(super) fn neighbor(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Option<PathBuf> {
-    let folder = path.parent()?;
-    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let names: Vec<String> = std::fs::read_dir(listed)
+    let parent = path.parent()?;
+    let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+    let names: Vec<String> = folder::names(listed)
         .ok()?
         .take(MAX_FOLDER_FILES)
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter_map(|name| name.into_string().ok())
         .filter(|name| is_alike(Path::new(name), path) && may_be_meant(Path::new(name)))
-        .filter(|name| matches!(file::kind(&folder.join(name)), Ok((FileKind::Regular, _))))
+        .filter(|name| matches!(file::kind(&parent.join(name)), Ok((FileKind::Regular, _))))
         .collect();
     let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
-    Some(folder.join(near))
+    Some(parent.join(near))
 }
 
 /// Another file with the same text in the folder of a missing scene file, which was probably renamed.
 pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
-    let folder = path.parent()?;
-    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let parent = path.parent()?;
+    let listed = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
     let length = u64::try_from(text.len()).ok()?;
     let has_text = |file: &PathBuf| {
         matches!(file::kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
             && bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
     };
-    let names = std::fs::read_dir(listed)
-        .ok()?
-        .take(MAX_FOLDER_FILES)
-        .filter_map(|entry| Some(entry.ok()?.file_name()));
-    let named = |name| folder.join::<std::ffi::OsString>(name);
+    let names = folder::names(listed).ok()?.take(MAX_FOLDER_FILES);
+    let named = |name| parent.join::<std::ffi::OsString>(name);
     // Folder order depends on the file system, so take the first by name.
     names.map(named).filter(|file| file != path && has_text(file)).min()
 }

@@ -146,6 +146,28 @@ const EXEMPT: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/pace.rs"];
 /// The module whose functions are compiled for named instruction sets, some of which have `mul_add`.
 const SIMD: &str = "accel/wide_bvh/simd";
 
+/// Functions of the standard library that panic if the system fails to close a folder, in all but the asset generator and the build
+/// scripts.
+const PANICKING: [&str; 2] = ["fs::read_dir(", "fs::remove_dir_all("];
+
+#[test]
+fn folders_are_read_without_panics() {
+    let mut found = Vec::new();
+    for (file, path) in all_sources() {
+        let is_test = path.to_str().is_some_and(|path| path.contains("tests"));
+        if is_test || path.starts_with("bin") {
+            continue;
+        }
+        let text = fs::read_to_string(&file).expect("a source file");
+        let production = text.split("\n#[cfg(test)]\n").next().unwrap_or_default();
+        let is_code = |(_, line): &(usize, &str)| !line.trim_start().starts_with("//");
+        let lines = (1..).zip(production.lines()).filter(is_code);
+        let called = lines.filter(|(_, line)| PANICKING.iter().any(|name| line.contains(name)));
+        found.extend(called.map(|(number, line)| format!("{}:{number}: {}", path.display(), line.trim())));
+    }
+    assert!(found.is_empty(), "use `system::folder`:\n{}", found.join("\n"));
+}
+
 #[test]
 fn images_do_not_depend_on_libm() {
     let mut found = Vec::new();

@@ -5,6 +5,7 @@
 pub mod abort;
 pub mod cpu_time;
 pub mod file;
+pub mod folder;
 pub mod machine;
 pub mod memory;
 pub mod priority;

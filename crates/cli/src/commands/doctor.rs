@@ -8,6 +8,7 @@ use crate::bench::cache;
 use crate::commands::check::count;
 use crate::console::Console;
 use crate::exit::Exit;
+use crate::system::folder::names;
 use crate::tui::{self, ColorDepth, Probe, ProbeReplies, probe};
 
 /// Prints one line per finding.
@@ -120,10 +121,10 @@ fn cache_folder() -> String {
         return "none (neither XDG_CACHE_HOME nor HOME is set)".to_owned();
     };
     let name = folder.display();
-    match std::fs::read_dir(&folder) {
-        Ok(entries) => {
+    match names(&folder) {
+        Ok(names) => {
             let sizes: Vec<u64> =
-                entries.filter_map(|entry| Some(entry.ok()?.metadata().ok()?.len())).collect();
+                names.filter_map(|name| Some(folder.join(name).symlink_metadata().ok()?.len())).collect();
             let bytes = sizes.iter().sum::<u64>();
             format!("{name}: {}, {:.1} MB", count(sizes.len() as u64, "file"), bytes as f64 / 1e6)
         }

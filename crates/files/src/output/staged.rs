@@ -10,6 +10,7 @@ use super::move_new::move_new;
 use super::temporary::{ATTEMPTS, next_name, remove_stale_folders};
 use super::{OutputError, stoppable};
 use crate::control::CancelToken;
+use crate::system::folder::remove_all;
 
 /// Writes files that are not there yet, each with its path below a folder: all of them, or none. They go into a hidden folder first;
 /// then each first part of a path gets its place, in the order of the files, never in place of anything. Hidden folders of killed
@@ -95,7 +96,7 @@ impl Hidden {
 impl Drop for Hidden {
     fn drop(&mut self) {
         // Ignore a failure: the next writer tries again.
-        let _ = fs::remove_dir_all(&self.path);
+        let _ = remove_all(&self.path);
     }
 }
 

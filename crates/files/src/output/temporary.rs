@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nix::fcntl::OFlag;
-use rustix::fs::Dir;
 
 use super::move_new::move_new;
+use crate::system::folder::{names, remove_all};
 use crate::system::machine::ProcessIdentity;
 
 /// Longest file name of nearly every file system.
@@ -123,16 +123,14 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
 pub(super) fn remove_stale_folders(directory: &Path) {
     for path in stale(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
-            let _ = remove_if_stale(&path, |path| fs::remove_dir_all(path));
+            let _ = remove_if_stale(&path, remove_all);
         }
     }
 }
 
-/// Everything in a directory that is named after a dead writer. (`std::fs::read_dir` panics if the directory cannot be closed.)
+/// Everything in a directory that is named after a dead writer.
 fn stale(directory: &Path) -> Vec<PathBuf> {
-    let opened = File::open(directory).ok().and_then(|opened| Dir::read_from(&opened).ok());
-    let names = opened.into_iter().flatten().flatten();
-    let names = names.map(|entry| OsStr::from_bytes(entry.file_name().to_bytes()).to_owned());
+    let names = names(directory).into_iter().flatten();
     names.filter(|name| has_dead_writer(name)).map(|name| directory.join(name)).collect()
 }
 
