@@ -133,15 +133,15 @@ fn assets_with_wrong_content_are_rejected() {
     let noise: Vec<u8> = (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
     let zeros = vec![0; 5000];
     for (ending, empty, wrong) in [
-        ("obj", "the file is empty", "bad.obj:1: this is a binary file of another kind"),
+        ("obj", "the file is empty", "bad.obj:1: this is a binary file in another format"),
         ("off", "the file is empty", "bad.off:1: "),
         ("ply", "the file is empty", "bad.ply:1: "),
         ("stl", "the file is empty", "bad.stl:"),
-        ("png", "the file is empty", "no image that can be read"),
-        ("jpg", "the file is empty", "no image that can be read"),
-        ("hdr", "the file is empty", "no image that can be read"),
-        ("exr", "the file is empty", "no image that can be read"),
-        ("txt", "has a line `s size radius`", "bad.txt:1: this is a binary file of another kind"),
+        ("png", "the file is empty", "unsupported image format"),
+        ("jpg", "the file is empty", "unsupported image format"),
+        ("hdr", "the file is empty", "unsupported image format"),
+        ("exr", "the file is empty", "unsupported image format"),
+        ("txt", "missing line `s size radius`", "bad.txt:1: this is a binary file in another format"),
     ] {
         let dir = TestDir::new();
         let file = format!("bad.{ending}");

@@ -27,20 +27,20 @@ pub(super) fn obj() -> Vec<Case> {
         (
             "a face with a missing vertex",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n".to_vec(),
-            "a.obj:4: vertex 4 is out of range: there are 3, from 1",
+            "a.obj:4: vertex 4 is out of range: there are 3, numbered from 1",
         ),
         (
             "vertex 0",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n".to_vec(),
-            "a.obj:4: vertex 0 is out of range: there are 3, from 1",
+            "a.obj:4: vertex 0 is out of range: there are 3, numbered from 1",
         ),
         (
             "a vertex index before the first",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n".to_vec(),
-            "a.obj:4: vertex -4 is out of range: there are 3, from 1",
+            "a.obj:4: vertex -4 is out of range: there are 3, numbered from 1",
         ),
-        ("no vertices", b"f 1 2 3\n".to_vec(), "a.obj:1: vertex 1 is out of range: there are 0, from 1"),
-        ("no faces", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), "a.obj: no usable face: the file has none"),
+        ("no vertices", b"f 1 2 3\n".to_vec(), "a.obj:1: vertex 1 is out of range: there are 0, numbered from 1"),
+        ("no faces", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), "a.obj: no usable face: the file has no faces"),
         (
             "vertices with words",
             b"v 0 0 zero\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec(),
@@ -54,22 +54,22 @@ pub(super) fn obj() -> Vec<Case> {
         (
             "vertices that are not finite",
             b"v nan 0 0\nv inf 0 0\nv 0 1e999 0\nf 1 2 3\n".to_vec(),
-            "a.obj: no usable face: of 1, 1 have a corner that is not finite and 0 have no area",
+            "a.obj: no usable face: 1 of 1 have a non-finite corner, 0 have zero area",
         ),
         (
             "a face with two vertices",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n".to_vec(),
-            "a.obj: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
+            "a.obj: no usable face: 0 of 1 have a non-finite corner, 1 have zero area",
         ),
         (
             "a face without vertices",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf\n".to_vec(),
-            "a.obj: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
+            "a.obj: no usable face: 0 of 1 have a non-finite corner, 1 have zero area",
         ),
         (
             "a face with three equal vertices",
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 1\n".to_vec(),
-            "a.obj: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
+            "a.obj: no usable face: 0 of 1 have a non-finite corner, 1 have zero area",
         ),
         ("missing texture coordinates", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1 2/2 3/3\n".to_vec(), ""),
         ("missing normals", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1//1 2//2 3//9\n".to_vec(), ""),
@@ -106,9 +106,9 @@ pub(super) fn obj() -> Vec<Case> {
         (
             "another format",
             b"ply\nformat ascii 1.0\nend_header\n".to_vec(),
-            "a.obj: no usable face: the file has none",
+            "a.obj: no usable face: the file has no faces",
         ),
-        ("bytes", every_byte(), "a.obj:1: this is a binary file of another kind"),
+        ("bytes", every_byte(), "a.obj:1: this is a binary file in another format"),
     ]
 }
 
@@ -124,17 +124,17 @@ pub(super) fn off() -> Vec<Case> {
         (
             "four billion vertices",
             b"OFF\n4000000000 1 0\n0 0 0\n".to_vec(),
-            "a.off:2: the header claims 4000000000 vertices and 1 face, and only 6 bytes follow",
+            "a.off:2: the header claims 4000000000 vertices and 1 face, but only 6 bytes follow",
         ),
         (
             "four billion faces",
             b"OFF\n3 4000000000 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
-            "a.off:2: the header claims 3 vertices and 4000000000 faces, and only 26 bytes follow",
+            "a.off:2: the header claims 3 vertices and 4000000000 faces, but only 26 bytes follow",
         ),
         (
             "the file ends within the vertices",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n".to_vec(),
-            "a.off:2: the header claims 3 vertices and 1 face, and only 12 bytes follow",
+            "a.off:2: the header claims 3 vertices and 1 face, but only 12 bytes follow",
         ),
         (
             "the file ends within the faces",
@@ -144,12 +144,12 @@ pub(super) fn off() -> Vec<Case> {
         (
             "a missing vertex",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(),
-            "a.off:6: vertex 3 is out of range: there are 3, from 0",
+            "a.off:6: vertex 3 is out of range: there are 3, numbered from 0",
         ),
         (
             "a vertex index before the first",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(),
-            "a.off:6: vertex -1 is out of range: there are 3, from 0",
+            "a.off:6: vertex -1 is out of range: there are 3, numbered from 0",
         ),
         (
             "a face with fewer vertices than declared",
@@ -164,7 +164,7 @@ pub(super) fn off() -> Vec<Case> {
         (
             "a face with two vertices",
             b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n".to_vec(),
-            "a.off: no usable face: of 1, 0 have a corner that is not finite and 1 have no area",
+            "a.off: no usable face: 0 of 1 have a non-finite corner, 1 have zero area",
         ),
         (
             "words in a vertex",
@@ -174,7 +174,7 @@ pub(super) fn off() -> Vec<Case> {
         (
             "a vertex with two coordinates",
             b"OFF\n3 1 0\n0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
-            "a.off:3: expected a coordinate, found the line's end",
+            "a.off:3: expected a coordinate, found the end of the line",
         ),
         (
             "words in a face",
@@ -184,25 +184,25 @@ pub(super) fn off() -> Vec<Case> {
         (
             "no faces",
             b"OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n".to_vec(),
-            "a.off: no usable face: the file has none",
+            "a.off: no usable face: the file has no faces",
         ),
         (
             "binary",
             b"OFF BINARY\n\0\0\0\x03".to_vec(),
-            "a.off:1: binary OFF files are not read; write it as text or PLY",
+            "a.off:1: binary OFF is not supported; convert it to text or PLY",
         ),
         (
             "four dimensions",
             b"4OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
-            "a.off:3: expected a coordinate, found the line's end",
+            "a.off:3: expected a coordinate, found the end of the line",
         ),
         (
             "not finite",
             b"OFF\n3 1 0\nnan nan nan\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(),
-            "a.off: no usable face: of 1, 1 have a corner that is not finite and 0 have no area",
+            "a.off: no usable face: 1 of 1 have a non-finite corner, 0 have zero area",
         ),
         ("another format", b"solid a\nendsolid a\n".to_vec(), "a.off:1: expected OFF, found \"solid\""),
-        ("bytes", every_byte(), "a.off:1: this is a binary file of another kind"),
+        ("bytes", every_byte(), "a.off:1: this is a binary file in another format"),
     ]
 }
 
@@ -210,52 +210,52 @@ pub(super) fn ply() -> Vec<Case> {
     vec![
         ("only the magic line", b"ply\n".to_vec(), "a.ply: the header has no end_header"),
         ("a header without an end", b"ply\nformat ascii 1.0\nelement vertex 3\n".to_vec(), "a.ply: the header has no end_header"),
-        ("an unknown format", b"ply\nformat morse 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:2: the format is ascii, binary_little_endian or binary_big_endian, not \"morse\""),
+        ("an unknown format", b"ply\nformat morse 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:2: the format must be ascii, binary_little_endian or binary_big_endian, not \"morse\""),
         ("version 2", b"ply\nformat ascii 2.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), ""),
-        ("an unknown type", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty quad x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:4: \"quad\" is no type of PLY"),
-        ("no x", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the vertices have no x, y and z"),
-        ("a negative count", b"ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:3: \"-3\" is no number of vertex"),
-        ("four billion vertices", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 times the element `vertex`, and only 26 bytes follow"),
-        ("four billion faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 times the element `face`, and only 9 bytes follow"),
-        ("the file ends within the vertices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n".to_vec(), "a.ply: the header claims 3 times the element `vertex`, and only 12 bytes follow"),
-        ("the file ends within the faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:14: face 2: the file ends here"),
-        ("a missing vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(), "a.ply:13: face 1: vertex 3 is out of range: there are 3, from 0"),
-        ("a vertex index before the first", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(), "a.ply:13: face 1: vertex -1 is out of range: there are 3, from 0"),
-        ("a list with a negative length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n-1\n".to_vec(), "a.ply:13: face 1: the length of a list is -1"),
-        ("a list of four billion", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: it claims 4294967295 corners, more than the file can hold"),
-        ("faces without vertex indices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the faces have no list of whole numbers `vertex_indices`"),
+        ("an unknown type", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty quad x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:4: \"quad\" is not a PLY type"),
+        ("no x", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the vertices need properties x, y and z"),
+        ("a negative count", b"ply\nformat ascii 1.0\nelement vertex -3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:3: \"-3\" is not a valid number of vertex"),
+        ("four billion vertices", b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 of element `vertex`, but only 26 bytes follow"),
+        ("four billion faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 4000000000\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the header claims 4000000000 of element `face`, but only 9 bytes follow"),
+        ("the file ends within the vertices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n".to_vec(), "a.ply: the header claims 3 of element `vertex`, but only 12 bytes follow"),
+        ("the file ends within the faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:14: face 2: unexpected end of file"),
+        ("a missing vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n".to_vec(), "a.ply:13: face 1: vertex 3 is out of range: there are 3, numbered from 0"),
+        ("a vertex index before the first", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n".to_vec(), "a.ply:13: face 1: vertex -1 is out of range: there are 3, numbered from 0"),
+        ("a list with a negative length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n-1\n".to_vec(), "a.ply:13: face 1: negative list length -1"),
+        ("a list of four billion", [&b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uint int vertex_indices\nend_header\n"[..], &[0; 36], &[0xff; 4]].concat(), "a.ply: face 1: a list claims 4294967295 items, more than the file can hold"),
+        ("faces without vertex indices", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty float q\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply: the element `face` needs an integer list `vertex_indices`"),
         ("words in a vertex", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 x\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:10: vertex 1: expected a number, found \"x\""),
-        ("no faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n".to_vec(), "a.ply: no usable face: the file has none"),
+        ("no faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n".to_vec(), "a.ply: no usable face: the file has no faces"),
         ("a property before any element", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n".to_vec(), "a.ply:3: a property before the first element"),
-        ("an element without a count", b"ply\nformat ascii 1.0\nelement vertex\nend_header\n".to_vec(), "a.ply:3: \"element\" is no statement of a PLY header"),
+        ("an element without a count", b"ply\nformat ascii 1.0\nelement vertex\nend_header\n".to_vec(), "a.ply:3: incomplete or unknown statement \"element\""),
         ("a list with a fractional length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list is a whole number"),
-        ("bytes", every_byte(), "a.ply:1: this is a binary file of another kind"),
+        ("bytes", every_byte(), "a.ply:1: this is a binary file in another format"),
     ]
 }
 
 pub(super) fn stl() -> Vec<Case> {
     vec![
-        ("only the first keyword", b"solid\n".to_vec(), "a.stl: no usable face: the file has none"),
-        ("no facets", b"solid a\nendsolid a\n".to_vec(), "a.stl: no usable face: the file has none"),
-        ("no count", vec![0; 82], "a.stl:1: this is a binary file of another kind"),
-        ("no facets", stl_of(0, &[]), "a.stl:1: this is a binary file of another kind"),
-        ("four billion facets", stl_of(4000000000, &FACET), "a.stl: the header claims 4000000000 facets, and the file ends after 1 of them"),
-        ("the file ends within a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facets, and the file ends after 0 of them"),
-        ("one facet fewer than declared", stl_of(2, &FACET), "a.stl: the header claims 2 facets, and the file ends after 1 of them"),
-        ("a facet with three equal vertices", stl_of(1, &[0; 50]), "a.stl: no usable face: of 1, 0 have a corner that is not finite and 1 have no area"),
-        ("not finite", stl_of(1, &[0xff; 50]), "a.stl: no usable face: of 1, 1 have a corner that is not finite and 0 have no area"),
+        ("only the first keyword", b"solid\n".to_vec(), "a.stl: no usable face: the file has no faces"),
+        ("no facets", b"solid a\nendsolid a\n".to_vec(), "a.stl: no usable face: the file has no faces"),
+        ("no count", vec![0; 82], "a.stl:1: this is a binary file in another format"),
+        ("no facets", stl_of(0, &[]), "a.stl:1: this is a binary file in another format"),
+        ("four billion facets", stl_of(4000000000, &FACET), "a.stl: the header claims 4000000000 facets, but the file ends after 1"),
+        ("the file ends within a facet", stl_of(1, &FACET[..30]), "a.stl: the header claims 1 facets, but the file ends after 0"),
+        ("one facet fewer than declared", stl_of(2, &FACET), "a.stl: the header claims 2 facets, but the file ends after 1"),
+        ("a facet with three equal vertices", stl_of(1, &[0; 50]), "a.stl: no usable face: 0 of 1 have a non-finite corner, 1 have zero area"),
+        ("not finite", stl_of(1, &[0xff; 50]), "a.stl: no usable face: 1 of 1 have a non-finite corner, 0 have zero area"),
         ("words in a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 zero 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:5: expected a coordinate, found \"zero\""),
         ("a vertex with two coordinates", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: expected a coordinate, found \"vertex\""),
-        ("two corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: a loop of 2 corners"),
+        ("two corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:6: a loop with only 2 corners"),
         ("four corners", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), ""),
         ("no loop", b"solid a\nfacet normal 0 0 1\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl:3: a vertex outside of \"outer loop\" and \"endloop\""),
-        ("the file ends within a loop", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n".to_vec(), "a.stl:6: the file ends in a facet"),
-        ("the file ends within a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0".to_vec(), "a.stl:4: the file ends in a vertex"),
-        ("an unknown word", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendlop\nendfacet\nendsolid a\n".to_vec(), "a.stl:7: expected a keyword of STL, found \"endlop\""),
+        ("the file ends within a loop", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n".to_vec(), "a.stl:6: the file ends inside a facet"),
+        ("the file ends within a vertex", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0".to_vec(), "a.stl:4: the file ends inside a vertex"),
+        ("an unknown word", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendlop\nendfacet\nendsolid a\n".to_vec(), "a.stl:7: expected an STL keyword, found \"endlop\""),
         ("a vertex outside a facet", b"solid a\nvertex 0 0 0\nendsolid a\n".to_vec(), "a.stl:2: a vertex outside of \"outer loop\" and \"endloop\""),
         ("a facet within a facet", b"solid a\nfacet normal 0 0 1\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), ""),
-        ("a coordinate that overflows", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e999 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl: no usable face: of 1, 1 have a corner that is not finite and 0 have no area"),
-        ("bytes", every_byte(), "a.stl: the header claims 1397903696 facets, and the file ends after 18 of them"),
+        ("a coordinate that overflows", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1e999 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), "a.stl: no usable face: 1 of 1 have a non-finite corner, 0 have zero area"),
+        ("bytes", every_byte(), "a.stl: the header claims 1397903696 facets, but the file ends after 18"),
     ]
 }
 
@@ -265,33 +265,33 @@ pub(super) fn mtl() -> Vec<Case> {
         (
             "a material without a name",
             b"newmtl\nKd 1 1 1\n".to_vec(),
-            "a.mtl:1: `newmtl` is followed by a name",
+            "a.mtl:1: expected a name after `newmtl`",
         ),
         (
             "words in a color",
             b"newmtl m\nKd red green blue\n".to_vec(),
-            "a.mtl:2: `Kd` is followed by three finite numbers",
+            "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         (
             "a color with two components",
             b"newmtl m\nKd 1 1\n".to_vec(),
-            "a.mtl:2: `Kd` is followed by three finite numbers",
+            "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         (
             "a color without components",
             b"newmtl m\nKd\n".to_vec(),
-            "a.mtl:2: `Kd` is followed by three finite numbers",
+            "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         (
             "not finite",
             b"newmtl m\nKd nan 1 1\n".to_vec(),
-            "a.mtl:2: `Kd` is followed by three finite numbers",
+            "a.mtl:2: expected three finite numbers after `Kd`",
         ),
         ("a negative colour", b"newmtl m\nKd -1 1 1\n".to_vec(), ""),
         (
             "a word as an exponent",
             b"newmtl m\nNs shiny\n".to_vec(),
-            "a.mtl:2: `Ns` is followed by a finite number",
+            "a.mtl:2: expected a finite number after `Ns`",
         ),
         ("a negative exponent", b"newmtl m\nKd 1 1 1\nNs -5\n".to_vec(), ""),
         ("index of refraction 0", b"newmtl m\nNi 0\nillum 7\n".to_vec(), ""),
@@ -299,24 +299,24 @@ pub(super) fn mtl() -> Vec<Case> {
         (
             "a word as an illumination model",
             b"newmtl m\nillum glass\n".to_vec(),
-            "a.mtl:2: `illum` is followed by a whole number",
+            "a.mtl:2: expected an integer after `illum`",
         ),
         (
             "an image without a name",
             b"newmtl m\nmap_Kd\n".to_vec(),
-            "a.mtl:2: `map_Kd` is followed by a file",
+            "a.mtl:2: expected a file name after `map_Kd`",
         ),
         ("a missing material", b"newmtl other\nKd 1 1 1\n".to_vec(), ""),
         (
             "a word as an opacity",
             b"newmtl m\nd opaque\n".to_vec(),
-            "a.mtl:2: `d` is followed by a finite number",
+            "a.mtl:2: expected a finite number after `d`",
         ),
         (
             "a word as a roughness",
             b"newmtl m\nPr smooth\n".to_vec(),
-            "a.mtl:2: `Pr` is followed by a finite number",
+            "a.mtl:2: expected a finite number after `Pr`",
         ),
-        ("bytes", every_byte(), "a.mtl:1: this is a binary file of another kind"),
+        ("bytes", every_byte(), "a.mtl:1: this is a binary file in another format"),
     ]
 }

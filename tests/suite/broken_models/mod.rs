@@ -15,10 +15,10 @@ use self::cases::{every_byte, mtl, obj, off, ply, stl};
 
 /// A JSON pointer, the value to put there, and text of the expected message.
 const EDITS: &[(&str, &str, &str)] = &[
-    ("/asset/version", r#""1.0""#, r#"it is glTF 1.0; version 2 is read"#),
+    ("/asset/version", r#""1.0""#, r#"glTF 1.0 is not supported; version 2 is required"#),
     ("/nodes/0/mesh", r#"7"#, r#"nodes[0]: meshes[7] does not exist: there are 1"#),
     ("/nodes/0/mesh", r#"-1"#, r#"invalid value: integer `-1`"#),
-    ("/nodes/0/children", r#"[0]"#, r#"nodes: each is a child of another"#),
+    ("/nodes/0/children", r#"[0]"#, r#"nodes: there is no root because every node is a child"#),
     ("/nodes/0/children", r#"[9]"#, r#"nodes[9] does not exist: there are 1"#),
     (
         "/meshes/0/primitives/0/attributes/POSITION",
@@ -33,15 +33,15 @@ const EDITS: &[(&str, &str, &str)] = &[
     (
         "/meshes/0/primitives/0/indices",
         r#"0"#,
-        r#"meshes[0].primitives[0]: indices: its indices are not whole numbers"#,
+        r#"meshes[0].primitives[0]: indices: indices must be integers"#,
     ),
     (
         "/meshes/0/primitives/0/attributes",
         r#"{"NORMAL": 0}"#,
         r#"meshes[0].primitives[0]: it has no positions"#,
     ),
-    ("/accessors/0/componentType", r#"5124"#, r#"accessors[0]: there is no component type 5124"#),
-    ("/accessors/0/type", r#""VEC9""#, r#"accessors[0]: there is no type "VEC9""#),
+    ("/accessors/0/componentType", r#"5124"#, r#"accessors[0]: unknown component type 5124"#),
+    ("/accessors/0/type", r#""VEC9""#, r#"accessors[0]: unknown type "VEC9""#),
     ("/accessors/0/count", r#"4000000000"#, r#"accessors[0]: 4000000000 elements from byte 0 need"#),
     ("/accessors/0/bufferView", r#"9"#, r#"accessors[0]: bufferViews[9] does not exist: there are 2"#),
     (
@@ -53,18 +53,18 @@ const EDITS: &[(&str, &str, &str)] = &[
     (
         "/bufferViews/0/byteLength",
         r#"4000000000"#,
-        r#"bufferViews[0]: bytes 0 + 4000000000 of buffers[0], which has 44"#,
+        r#"bufferViews[0]: bytes 0 + 4000000000 exceed buffers[0], which has 44"#,
     ),
-    ("/bufferViews/0/byteStride", r#"4"#, r#"bufferViews[0]: a stride of 4 bytes for elements of 12"#),
-    ("/buffers/0/byteLength", r#"4000000000"#, r#"buffers[0]: it claims 4000000000 bytes, and there are 44"#),
-    ("/buffers/0/uri", r#""/etc/passwd""#, r#"buffers[0]: "/etc/passwd" is no file beside it"#),
-    ("/buffers/0/uri", r#""data:;base64,%%%%""#, r#"is no digit of base64"#),
+    ("/bufferViews/0/byteStride", r#"4"#, r#"bufferViews[0]: invalid stride of 4 bytes for elements of 12 bytes"#),
+    ("/buffers/0/byteLength", r#"4000000000"#, r#"buffers[0]: it claims 4000000000 bytes but has 44"#),
+    ("/buffers/0/uri", r#""/etc/passwd""#, r#"buffers[0]: "/etc/passwd" is not a relative URI"#),
+    ("/buffers/0/uri", r#""data:;base64,%%%%""#, r#"invalid base64 byte"#),
     ("/scene", r#"3"#, r#""#),
     ("/meshes/0/primitives/0/material", r#"4"#, r#"nodes[0]: materials[4] does not exist: there are 0"#),
     (
         "/extensionsRequired",
         r#"["KHR_draco_mesh_compression"]"#,
-        r#"it needs KHR_draco_mesh_compression, which this version does not read; export it without Draco compression"#,
+        r#"KHR_draco_mesh_compression is not supported; export it without Draco compression"#,
     ),
 ];
 
@@ -145,9 +145,9 @@ fn gltf_files() {
     }
     for (text, expected) in [
         ("{", "a.gltf:1: column 1: EOF while parsing an object"),
-        ("{\"a\": 1}", "a.gltf: it is no glTF: asset.version is missing"),
-        ("[]", "a.gltf: it is no glTF: neither GLB nor an object of JSON"),
-        (" ", "a.gltf: it is no glTF: neither GLB nor an object of JSON"),
+        ("{\"a\": 1}", "a.gltf: not a glTF file: asset.version is missing"),
+        ("[]", "a.gltf: not a glTF file: neither GLB nor a JSON object"),
+        (" ", "a.gltf: not a glTF file: neither GLB nor a JSON object"),
         ("", "a.gltf: the file is empty"),
         ("{\"asset\": {\"version\": \"2.0\"}} x", "a.gltf:1: column 31: trailing characters"),
     ] {
@@ -178,7 +178,7 @@ fn glb_files() {
     let all = file(head, &[own.clone(), rest.clone()]);
     let has = text.len() + 44 + 8;
     let claims = |at: usize, has: usize| {
-        format!("a.glb: the chunk at byte {at} claims 2147483648 bytes, and the file has {has} more")
+        format!("a.glb: the chunk at byte {at} claims 2147483648 bytes, but {has} are left")
     };
     let place = 12 + own.len();
     let cases: Vec<(&str, Vec<u8>, String)> = vec![
@@ -189,37 +189,37 @@ fn glb_files() {
             String::new(),
         ),
         ("two of each", file(head, &[own.clone(), rest.clone(), own.clone(), rest.clone()]), String::new()),
-        ("only the magic number", b"glTF".to_vec(), "a.glb: the file ends in its header".to_owned()),
-        ("half a version", b"glTF\x02\0".to_vec(), "a.glb: the file ends in its header".to_owned()),
+        ("only the magic number", b"glTF".to_vec(), "a.glb: the file ends inside the header".to_owned()),
+        ("half a version", b"glTF\x02\0".to_vec(), "a.glb: the file ends inside the header".to_owned()),
         (
             "version 1",
             file(b"glTF\x01\0\0\0\0\0\0\0", std::slice::from_ref(&own)),
-            "a.glb: it is GLB of version 1; version 2 is read".to_owned(),
+            "a.glb: GLB version 1 is not supported; version 2 is required".to_owned(),
         ),
         (
             "version 4294967295",
             file(b"glTF\xff\xff\xff\xff\0\0\0\0", &[]),
-            "a.glb: it is GLB of version 4294967295; version 2 is read".to_owned(),
+            "a.glb: GLB version 4294967295 is not supported; version 2 is required".to_owned(),
         ),
-        ("no chunk", head.to_vec(), "a.glb: it has no JSON".to_owned()),
-        ("half a chunk header", file(head, &[own[..6].to_vec()]), "a.glb: it has no JSON".to_owned()),
-        ("no JSON", file(head, std::slice::from_ref(&rest)), "a.glb: it has no JSON".to_owned()),
+        ("no chunk", head.to_vec(), "a.glb: the JSON chunk is missing".to_owned()),
+        ("half a chunk header", file(head, &[own[..6].to_vec()]), "a.glb: the JSON chunk is missing".to_owned()),
+        ("no JSON", file(head, std::slice::from_ref(&rest)), "a.glb: the JSON chunk is missing".to_owned()),
         (
             "only an unknown chunk",
             file(head, &[chunk(b"MINE", 4, b"abcd")]),
-            "a.glb: it has no JSON".to_owned(),
+            "a.glb: the JSON chunk is missing".to_owned(),
         ),
         ("a claim of 2 GiB of JSON", file(head, &[long_text, rest.clone()]), claims(12, has)),
         ("a claim of 2 GiB of binary data", file(head, &[own.clone(), long_rest]), claims(place, 44)),
         (
             "truncated binary data",
             file(head, &[own.clone(), short]),
-            format!("a.glb: the chunk at byte {place} claims 44 bytes, and the file has 40 more"),
+            format!("a.glb: the chunk at byte {place} claims 44 bytes, but 40 are left"),
         ),
         (
             "truncated JSON",
             all[..200].to_vec(),
-            format!("a.glb: the chunk at byte 12 claims {} bytes, and the file has 180 more", text.len()),
+            format!("a.glb: the chunk at byte 12 claims {} bytes, but 180 are left", text.len()),
         ),
         (
             "no numbers",
@@ -229,7 +229,7 @@ fn glb_files() {
         (
             "fewer numbers",
             file(head, &[own, chunk(b"BIN\0", 40, &binary[..40])]),
-            "a.glb: buffers[0]: it claims 44 bytes, and there are 40".to_owned(),
+            "a.glb: buffers[0]: it claims 44 bytes but has 40".to_owned(),
         ),
         (
             "broken JSON",
@@ -239,9 +239,9 @@ fn glb_files() {
         (
             "an empty JSON chunk",
             file(head, &[empty, rest]),
-            "a.glb: it is no glTF: its JSON is no object".to_owned(),
+            "a.glb: not a glTF file: the JSON is not an object".to_owned(),
         ),
-        ("every byte", every_byte(), "a.glb: it is no glTF: neither GLB nor an object of JSON".to_owned()),
+        ("every byte", every_byte(), "a.glb: not a glTF file: neither GLB nor a JSON object".to_owned()),
         ("nothing", Vec::new(), "a.glb: the file is empty".to_owned()),
     ];
     assert!(cases.len() >= 20);

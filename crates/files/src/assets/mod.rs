@@ -1,6 +1,6 @@
-//! Assets: from bytes to meshes, textures and cameras. Every error names the file and, if the file has lines, the line.
+//! Reads meshes, textures and cameras. Every error names the file and, in text files, the line.
 
-pub mod contain;
+pub mod catch_panic;
 pub mod gltf;
 pub mod image;
 pub mod mesh;
@@ -13,7 +13,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::materials::PixelValue;
 use crate::math::{DVec2, Vec2, Vec3};
 
-/// Reasons for which a file could not be used.
+/// Error of a file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
     /// The file could not be read, or is not a regular file.
@@ -21,7 +21,7 @@ pub enum AssetError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// The reason, in words.
+        /// The reason, for the user.
         reason: String,
     },
     /// The content of the file is wrong.
@@ -31,11 +31,11 @@ pub enum AssetError {
         path: PathBuf,
         /// Line, from 1. `None` for files without lines.
         line: Option<usize>,
-        /// The reason, in words.
+        /// The reason, for the user.
         reason: String,
     },
-    /// There is not enough memory for its content.
-    #[error("out of memory: {} MB for {} were refused", bytes.div_ceil(1_000_000), path.display())]
+    /// An allocation for the file's content failed.
+    #[error("out of memory: cannot allocate {} MB for {}", bytes.div_ceil(1_000_000), path.display())]
     OutOfMemory {
         /// The file.
         path: PathBuf,
@@ -57,10 +57,20 @@ impl AssetError {
     }
 }
 
-/// BLAKE3 hash of a file's bytes, computed from the same bytes that are decoded.
+/// Line and reason of a file's rejection.
+#[cfg(test)]
+pub(crate) fn rejection<T: std::fmt::Debug>(result: Result<T, AssetError>) -> (Option<usize>, String) {
+    match result {
+        Err(AssetError::Malformed { line, reason, .. }) => (line, reason),
+        Err(AssetError::Unreadable { reason, .. }) => (None, reason),
+        other => panic!("not rejected: {other:?}"),
+    }
+}
+
+/// BLAKE3 hash of a file, computed from the bytes that are decoded.
 pub type FileHash = [u8; 32];
 
-/// A file that another file names.
+/// A file referenced by another file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Companion {
     /// The file.
@@ -69,69 +79,70 @@ pub struct Companion {
     pub hash: Option<FileHash>,
 }
 
-/// A mesh file's content.
+/// A decoded mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadedMesh {
     /// Hash of the file.
     pub hash: FileHash,
-    /// The triangles that can be used.
+    /// Triangles of all usable faces.
     pub mesh: TriangleMesh,
-    /// The file's own materials, which [`TriangleMesh::materials`] refers to.
+    /// Materials of the file, indexed by [`TriangleMesh::materials`].
     pub materials: Vec<FileMaterial>,
-    /// Faces that were left out.
+    /// Counts of skipped faces.
     pub dropped: Dropped,
-    /// Other warnings, a line each.
+    /// Other warnings, one line each.
     pub warnings: Vec<String>,
-    /// Warnings about its own materials, a line each; they do not matter if the scene gives the mesh another material.
+    /// Warnings about the file's materials, one line each. They do not apply if the scene assigns another
+    /// material.
     pub material_warnings: Vec<String>,
-    /// Files that belong to the mesh file, read or missing: material libraries, or the buffers of a glTF file. If one of them
-    /// changes, so does this value.
+    /// Files that the mesh depends on, read or missing: material libraries, or buffers of a glTF file. If one
+    /// of them changes, the mesh changes.
     pub companions: Vec<Companion>,
-    /// Pictures that the material libraries or the glTF file name, looked up or not.
+    /// Images named by the material libraries or the glTF file, whether or not they are used.
     pub pictures: Vec<PathBuf>,
 }
 
 impl LoadedMesh {
-    /// Whether it has no normals and is of flat faces, as a box is.
+    /// Whether the mesh has no normals and consists of flat faces, like a box.
     pub fn is_faceted(&self) -> bool {
         mesh::normals::is_faceted(&self.mesh)
     }
 
-    /// Whether there are triangles and no material for any of them.
+    /// Whether the mesh has triangles but no materials.
     pub fn lacks_materials(&self) -> bool {
         self.materials.is_empty() && !self.mesh.triangles.is_empty()
     }
 }
 
-/// Faces that could not be used.
+/// Counts of faces that cannot be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
     /// Faces with a NaN or an infinite coordinate.
     pub non_finite: u64,
-    /// Faces with two corners at one place, or all corners on a line.
+    /// Faces with coincident or collinear corners.
     pub degenerate: u64,
 }
 
-/// A material of a mesh file (MTL).
+/// A material from an MTL file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileMaterial {
-    /// Its name in the file.
+    /// Name in the file.
     pub name: String,
     /// Diffuse reflectance, `Kd`.
     pub diffuse: Vec3,
-    /// Specular reflectance, `Ks`: the strength of the classic highlight without normalisation.
+    /// Specular reflectance, `Ks`: scale of the unnormalized Phong lobe.
     pub specular: Vec3,
-    /// Exponent, `Ns`.
+    /// Phong exponent, `Ns`.
     pub shininess: f32,
-    /// Emission, `Ke`: radiance; with a texture, the factor on it.
+    /// Emitted radiance, `Ke`; scales the texture if there is one.
     pub emission: Vec3,
     /// Index of refraction, `Ni`.
     pub ior: f32,
     /// Illumination model, `illum`.
     pub illumination_model: Option<u8>,
-    /// Opacity in [0, 1], `d` or else 1 − `Tr`.
+    /// Opacity in [0, 1]: `d`, or 1 − `Tr`.
     pub opacity: f32,
-    /// Texture of the opacity, `map_d`, in its place.
+    /// Opacity texture, `map_d`; replaces `opacity`.
     pub opacity_texture: Option<FileTexture>,
     /// Diffuse texture, `map_Kd`.
     pub diffuse_texture: Option<FileTexture>,
@@ -141,39 +152,39 @@ pub struct FileMaterial {
     pub emission_texture: Option<FileTexture>,
     /// Normal map, `norm` or `map_Bump`.
     pub normal_texture: Option<FileTexture>,
-    /// Factor on its slopes, ≥ 0: the option `-bm`, or 1.
+    /// Scale of the normal map's slopes, ≥ 0: the option `-bm`, default 1.
     pub normal_strength: f32,
-    /// What the extension for physically based rendering says. `None` without any of its statements.
+    /// Parameters of the PBR extension. `None` if the file uses none of its statements.
     pub physical: Option<PhysicalMaterial>,
 }
 
 impl FileMaterial {
-    /// Whether it has a highlight. Without an exponent above 0 it would be spread over the hemisphere at full strength; the models 0 and 1
-    /// have none.
+    /// Whether the material has a specular highlight. An exponent of 0 would spread it over the hemisphere at
+    /// full strength; illumination models 0 and 1 have none.
     pub fn has_highlight(&self) -> bool {
         self.shininess > 0.0 && !matches!(self.illumination_model, Some(0 | 1))
     }
 
-    /// Whether its mirror is a coat over a stronger diffuse color.
+    /// Whether the specular reflection is a coat over a stronger diffuse color.
     pub fn is_coated(&self) -> bool {
         self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
     }
 }
 
-/// A texture of a mesh file's material, with the options of its map.
+/// A texture of an MTL material with its map options.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileTexture {
-    /// The image, relative to the MTL's folder.
+    /// Image file, relative to the MTL file's folder.
     pub path: PathBuf,
-    /// Factor on the coordinates, `-s`.
+    /// Scale of the texture coordinates, `-s`.
     pub repeat: Vec2,
-    /// Translation of the repeated coordinates, `-o`.
+    /// Offset of the scaled texture coordinates, `-o`.
     pub offset: DVec2,
-    /// Whether the border continues, `-clamp on`.
+    /// Whether coordinates outside [0, 1] are clamped, `-clamp on`.
     pub is_clamped: bool,
-    /// Summand and factor of the values, `-mm`.
+    /// Offset and scale of the values, `-mm`.
     pub range: (f32, f32),
-    /// The number of a pixel, if it is asked for: `-imfchan`.
+    /// Channel to read as a scalar, `-imfchan`.
     pub number: Option<PixelValue>,
 }
 
@@ -190,47 +201,47 @@ impl FileTexture {
         }
     }
 
-    /// Whether another texture shows the same image at the same coordinates.
+    /// Whether both textures show the same image at the same coordinates.
     pub fn is_same_image(&self, other: &Self) -> bool {
         let at = |texture: &Self| (texture.repeat, texture.offset, texture.is_clamped);
         self.path == other.path && at(self) == at(other)
     }
 }
 
-/// The extension of MTL for physically based rendering. Numbers are in [0, 1].
+/// PBR extension of MTL. Values are in [0, 1].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMaterial {
     /// Roughness, `Pr`.
     pub roughness: f32,
-    /// Weight of the metal, `Pm`.
+    /// Metallic weight, `Pm`.
     pub metallic: f32,
-    /// Weight of a clear coat, `Pc`.
+    /// Clear coat weight, `Pc`.
     pub clearcoat: f32,
-    /// Roughness of the clear coat, `Pcr`.
+    /// Clear coat roughness, `Pcr`.
     pub clearcoat_roughness: f32,
-    /// Texture of the roughness, `map_Pr`.
+    /// Roughness texture, `map_Pr`.
     pub roughness_texture: Option<FileTexture>,
-    /// Texture of the metal's weight, `map_Pm`.
+    /// Metallic texture, `map_Pm`.
     pub metallic_texture: Option<FileTexture>,
 }
 
-/// A gKit orbiter camera: the scene's centre seen from outside.
+/// A gKit orbiter camera, which orbits around the scene's center.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbiterCamera {
-    /// `c`: centre of the view.
+    /// `c`: point that the camera looks at.
     pub center: [f64; 3],
-    /// `p`: offset in the picture's plane.
+    /// `p`: offset in the image plane.
     pub position: [f64; 2],
     /// `r`: rotation in degrees, about x and y.
     pub rotation: [f64; 2],
-    /// `s`: distance to the centre, and the scene's radius.
+    /// `s`: distance to the center.
     pub size: f64,
-    /// Second number of `s`.
+    /// Second number of `s`: radius of the scene.
     pub radius: f64,
-    /// `f`: vertical angle in degrees.
+    /// `f`: vertical field of view in degrees.
     pub fov: f64,
-    /// Second and third number of `f`: size in pixels.
+    /// Second number of `f`: width in pixels.
     pub width: f64,
-    /// Pixels down.
+    /// Third number of `f`: height in pixels.
     pub height: f64,
 }

@@ -1,20 +1,21 @@
-//! gKit orbiter files: five lines of text, each a letter and its numbers.
+//! gKit orbiter files: five lines of text, each a letter followed by numbers.
 //!
 //! ```text
-//! c 0 1 0          centre that is looked at
-//! p 0 0            offset in the picture's plane
+//! c 0 1 0          point that the camera looks at
+//! p 0 0            offset in the image plane
 //! r 18 16          rotation about x and y, degrees
-//! s 2.5 3.5        distance to the centre, radius of the scene
-//! f 45 1024 640    vertical angle in degrees, width and height in pixels
+//! s 2.5 3.5        distance to the center, radius of the scene
+//! f 45 1024 640    vertical field of view in degrees, width and height in pixels
 //! ```
 //!
-//! gKit's `Orbiter` class defines their meaning. A point of the world goes to camera space (x right, y up, looking
-//! along −z) by
+//! gKit's `Orbiter` class defines their meaning. It maps world space to camera space (x right, y up, looking
+//! along −z):
 //!
 //! `view = T(−p.x, −p.y, −size) · Rx(r.x) · Ry(r.y) · T(−c)`
 //!
-//! with right-handed rotations, `T` applied last on the left. The projection is a perspective one with the whole
-//! vertical angle `fov` and the aspect `width / height`; the radius only sets its near and far planes.
+//! with right-handed rotations; the rightmost transform is applied first. The projection is a perspective
+//! with the vertical field of view `fov` and the aspect ratio `width / height`. The radius only sets its near
+//! and far planes.
 
 use std::path::Path;
 
@@ -22,21 +23,21 @@ use super::{AssetError, FileHash, OrbiterCamera, read};
 use crate::control::{CancelToken, ignore_progress};
 use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 
-/// Most bytes of an orbiter file, which has five lines: a larger file is something else.
+/// Maximum size of an orbiter file.
 const LIMIT: u64 = 1 << 20;
 
-/// The angle of gKit's viewer, for files from before the `f` line.
+/// Field of view and image size of gKit's viewer, for old files without an `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 
-/// Reads an orbiter file; returns its hash too. `c` and `s` are required; without them, `p` and `r` are 0 and `f` is 45 degrees at
-/// 1024 × 640.
+/// Reads an orbiter file and returns the camera and the file's hash. `c` and `s` are required; `p` and `r`
+/// default to 0, and `f` to 45 degrees at 1024 × 640.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line: an unknown letter, a wrong count of numbers,
 /// a number that is not finite or out of range.
 pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
-    let bytes = read::text(path, LIMIT, read::Watch { progress: &ignore_progress, token: &token })?;
+    let bytes = read::text(path, LIMIT, read::Monitor { progress: &ignore_progress, token: &token })?;
     Ok((parse(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
 }
 
@@ -55,12 +56,11 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
             Some("f") => field = Some(view_angle(numbers("f", words)).map_err(wrong)?),
             Some(other) => {
                 let shown: String = other.chars().take(20).collect();
-                return Err(wrong(format!("expected a line c, p, r, s or f, found {shown:?}")));
+                return Err(wrong(unknown_line(&shown)));
             }
         }
     }
-    let missing =
-        |letter| AssetError::malformed(path, None, format!("an orbiter file has a line `{letter}`"));
+    let missing = |line| AssetError::malformed(path, None, missing_line(line));
     let [size, radius] = size.ok_or_else(|| missing("s size radius"))?;
     let [fov, width, height] = field.unwrap_or(DEFAULT_FIELD);
     Ok(OrbiterCamera {
@@ -75,6 +75,38 @@ fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {
     })
 }
 
+fn missing_line(line: &str) -> String {
+    format!("missing line `{line}`")
+}
+
+fn unknown_line(found: &str) -> String {
+    format!("expected a line starting with c, p, r, s or f, found {found:?}")
+}
+
+fn wrong_count(letter: &str, count: usize) -> String {
+    format!("expected {count} finite numbers after `{letter}`")
+}
+
+fn too_large(letter: &str, number: f64) -> String {
+    format!("numbers after `{letter}` must be below {LARGEST:e} in magnitude, not {number:e}")
+}
+
+fn too_short(size: f64) -> String {
+    format!("the distance in `s` must be above {SHORTEST:e}, not {size:e}")
+}
+
+fn not_positive(size: f64) -> String {
+    format!("the distance in `s` must be positive, not {size}")
+}
+
+fn wrong_angle(fov: f64) -> String {
+    format!("the angle in `f` must be between 0 and 180 degrees, not {fov}")
+}
+
+fn wrong_size(width: f64, height: f64) -> String {
+    format!("width and height in `f` must be positive, not {width} × {height}")
+}
+
 fn numbers<'a, const N: usize>(
     letter: &str,
     words: impl Iterator<Item = &'a str>,
@@ -82,23 +114,19 @@ fn numbers<'a, const N: usize>(
     let found: Option<Vec<f64>> =
         words.map(|word| word.parse().ok().filter(|n: &f64| n.is_finite())).collect();
     let exact: Option<[f64; N]> = found.and_then(|found| found.try_into().ok());
-    let numbers = exact.ok_or_else(|| format!("`{letter}` is followed by {N} finite numbers"))?;
+    let numbers = exact.ok_or_else(|| wrong_count(letter, N))?;
     match numbers.iter().find(|number| number.abs() > LARGEST) {
-        Some(number) => {
-            Err(format!("the numbers of `{letter}` are less than {LARGEST:e} in magnitude, not {number:e}"))
-        }
+        Some(number) => Err(too_large(letter, *number)),
         None => Ok(numbers),
     }
 }
 
-/// The distance of `s`; a radius of 0 only moves planes that a ray tracer does not have.
+/// Checks the distance of `s`. The radius is not checked because only a rasterizer has clip planes.
 fn positive(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
     let [size, radius] = numbers?;
     match () {
-        () if !(size > 0.0) => Err(format!("the distance in `s` is above 0, not {size}")),
-        () if is_too_short(size) => {
-            Err(format!("the distance in `s` is more than {SHORTEST:e}, not {size:e}"))
-        }
+        () if !(size > 0.0) => Err(not_positive(size)),
+        () if is_too_short(size) => Err(too_short(size)),
         () => Ok([size, radius]),
     }
 }
@@ -106,10 +134,10 @@ fn positive(numbers: Result<[f64; 2], String>) -> Result<[f64; 2], String> {
 fn view_angle(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
     let [fov, width, height] = numbers?;
     if !(fov > 0.0 && fov < 180.0) {
-        return Err(format!("the angle in `f` is between 0 and 180 degrees, not {fov}"));
+        return Err(wrong_angle(fov));
     }
     if !(width > 0.0 && height > 0.0) {
-        return Err(format!("width and height in `f` are above 0, not {width} × {height}"));
+        return Err(wrong_size(width, height));
     }
     Ok([fov, width, height])
 }
@@ -117,13 +145,14 @@ fn view_angle(numbers: Result<[f64; 3], String>) -> Result<[f64; 3], String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assets::rejection;
 
-    fn says(text: &str) -> String {
-        parse(Path::new("cam.txt"), text).expect_err("refused").to_string()
+    fn error(text: &str) -> (Option<usize>, String) {
+        rejection(parse(Path::new("cam.txt"), text))
     }
 
     #[test]
-    fn every_number_finds_its_place() {
+    fn every_number_is_read() {
         let text = "c -1 2 3\np 0.5 -0.25\nr 18 16\ns 4 5\nf 30 1024 640\n";
         let camera = parse(Path::new("cam.txt"), text).expect("whole");
         assert_eq!(camera.center, [-1.0, 2.0, 3.0]);
@@ -134,31 +163,31 @@ mod tests {
     }
 
     #[test]
-    fn lines_may_be_missing_where_a_default_is_sensible() {
-        let camera = parse(Path::new("cam.txt"), "# of old\r\ns 4 5\r\n\r\nc 0 0 0\r\n").expect("whole");
+    fn lines_with_a_default_are_optional() {
+        let camera = parse(Path::new("cam.txt"), "# old\r\ns 4 5\r\n\r\nc 0 0 0\r\n").expect("whole");
         assert_eq!((camera.rotation, camera.fov), ([0.0, 0.0], 45.0));
-        assert!(says("c 0 0 0").contains("`s size radius`"));
-        assert!(says("s 1 1").contains("`c x y z`"));
+        assert_eq!(error("c 0 0 0"), (None, missing_line("s size radius")));
+        assert_eq!(error("s 1 1"), (None, missing_line("c x y z")));
     }
 
     #[test]
-    fn errors_name_line_and_rule() {
-        assert!(says("c 0 0 0\np 1\n").starts_with("cam.txt:2: `p` is followed by 2 finite numbers"));
-        assert!(says("c 0 nan 0").starts_with("cam.txt:1: `c`"));
-        assert!(says("r 0 1 2").contains("2 finite numbers"));
-        assert!(says("\ns 0 1").starts_with("cam.txt:2: the distance"));
-        assert!(says("f 180 4 3").contains("between 0 and 180"));
-        assert!(says("f 40 4 0").contains("above 0"));
-        assert!(says("x 1").contains("found \"x\""));
-        for (line, words) in [
-            ("c 0 1e20 0", "`c` are less than 1e18 in magnitude, not 1e20"),
-            ("p 1e308 0", "`p` are less than 1e18"),
-            ("r 0 -1e19", "`r` are less than 1e18"),
-            ("s 1e20 1", "`s` are less than 1e18"),
-            ("s 1e-30 1", "the distance in `s` is more than 1e-18, not 1e-30"),
-            ("f 40 1e19 3", "`f` are less than 1e18"),
+    fn errors_name_line_and_reason() {
+        for (text, line, reason) in [
+            ("c 0 0 0\np 1\n", 2, wrong_count("p", 2)),
+            ("c 0 nan 0", 1, wrong_count("c", 3)),
+            ("r 0 1 2", 1, wrong_count("r", 2)),
+            ("\ns 0 1", 2, not_positive(0.0)),
+            ("f 180 4 3", 1, wrong_angle(180.0)),
+            ("f 40 4 0", 1, wrong_size(4.0, 0.0)),
+            ("x 1", 1, unknown_line("x")),
+            ("c 0 1e20 0", 1, too_large("c", 1e20)),
+            ("p 1e308 0", 1, too_large("p", 1e308)),
+            ("r 0 -1e19", 1, too_large("r", -1e19)),
+            ("s 1e20 1", 1, too_large("s", 1e20)),
+            ("s 1e-30 1", 1, too_short(1e-30)),
+            ("f 40 1e19 3", 1, too_large("f", 1e19)),
         ] {
-            assert!(says(line).starts_with("cam.txt:1: ") && says(line).contains(words), "{}", says(line));
+            assert_eq!(error(text), (Some(line), reason), "{text}");
         }
     }
 }

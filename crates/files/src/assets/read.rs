@@ -1,4 +1,4 @@
-//! Reading files safely: only regular files, never more than a limit, with progress and cancellation.
+//! Reads regular files with a size limit, progress and cancellation.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -9,17 +9,29 @@ use crate::control::{CancelToken, Cancelled, Progress};
 pub(crate) use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 
-/// Bytes between two polls of the token.
+/// Bytes between two polls of the cancel token.
 const CHUNK: usize = 1 << 20;
 
-/// Progress sink and cancel token of the work.
+/// Reason to reject a Git LFS pointer.
+const LFS_POINTER: &str = "it is a Git LFS pointer, not the file's content: run `git lfs pull`";
+/// Reason to reject binary data where text is expected.
+pub(crate) const BINARY_FILE: &str = "this is a binary file in another format";
+/// Reason to reject UTF-16.
+pub(crate) const UTF16_TEXT: &str = "this is text in UTF-16; save it as UTF-8";
+
+/// Reason to reject a file of another type than a regular file.
+fn not_regular(kind: FileKind) -> String {
+    format!("it is {}, not a regular file", kind.words())
+}
+
+/// Progress callback and cancel token of a load.
 #[derive(Clone, Copy)]
-pub(crate) struct Watch<'a> {
+pub(crate) struct Monitor<'a> {
     pub(crate) progress: Progress<'a>,
     pub(crate) token: &'a CancelToken,
 }
 
-impl Watch<'_> {
+impl Monitor<'_> {
     /// Reports progress, then polls the token.
     pub(crate) fn tick(&self, done: usize, total: usize) -> Result<(), Cancelled> {
         (self.progress)(done as u64, total as u64);
@@ -27,86 +39,85 @@ impl Watch<'_> {
     }
 }
 
-/// Hash of a file that was read as a whole.
+/// Hash of a completely read file.
 pub(crate) fn hash(bytes: &[u8]) -> FileHash {
     *blake3::hash(bytes).as_bytes()
 }
 
-/// Opens a regular file of at most `limit` bytes and returns its length too. Pipes, devices and folders are refused
-/// before they are opened, so that nothing blocks.
+/// Opens a regular file of at most `limit` bytes and returns it with its length. Rejects pipes, devices and
+/// folders before opening them, because opening a pipe may block.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
-    let refused =
-        |kind: FileKind| AssetError::unreadable(path, format!("it is {}, not a regular file", kind.words()));
+    let refused = |kind: FileKind| AssetError::unreadable(path, not_regular(kind));
     let (mut file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
     if found.len() > limit {
-        let reason = format!("it has {} bytes, more than the {} MiB that are read", found.len(), limit >> 20);
+        let reason = format!("it has {} bytes; the limit is {} MiB", found.len(), limit >> 20);
         return Err(AssetError::unreadable(path, reason));
     }
     if found.len() < file::LFS_POINTER_LIMIT {
         let mut bytes = Vec::new();
         (&mut file).take(file::LFS_POINTER_LIMIT).read_to_end(&mut bytes).map_err(unreadable)?;
         if file::is_lfs_pointer(&bytes) {
-            let reason = "it is a Git LFS pointer, not the file's content: run `git lfs pull`";
-            return Err(AssetError::unreadable(path, reason));
+            return Err(AssetError::unreadable(path, LFS_POINTER));
         }
         file.rewind().map_err(unreadable)?;
     }
     Ok((file, found.len()))
 }
 
-/// Bytes at the start of a file by which text is recognised.
+/// Bytes at the start of a file that are checked for binary data.
 const START: usize = 1 << 12;
 
-/// Reads a text file; a file whose start is binary is refused before the rest is read.
-pub(crate) fn text(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |start| {
+/// Reads a text file. Rejects a binary file after its first [`START`] bytes.
+pub(crate) fn text(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
         binary_if(path, start.contains(&0))
     })
 }
 
-/// Reads a file whose first three bytes are not zeros: they are letters in every format that uses this function.
-pub(crate) fn lettered(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |start| {
+/// Reads a text or binary file of a format that starts with three letters.
+pub(crate) fn text_or_binary(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, monitor, |start| {
         refuse_utf16(path, start)?;
         binary_if(path, start[..start.len().min(3)].contains(&0))
     })
 }
 
-/// Reads the start of a regular file, at most so many bytes.
-pub(crate) fn start(path: &Path, most: u64) -> Result<Vec<u8>, AssetError> {
+/// Reads at most `limit` bytes from the start of a regular file.
+pub(crate) fn start(path: &Path, limit: u64) -> Result<Vec<u8>, AssetError> {
     let (file, _) = open(path, u64::MAX)?;
     let mut bytes = Vec::new();
-    let read = file.take(most).read_to_end(&mut bytes);
+    let read = file.take(limit).read_to_end(&mut bytes);
     read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, describe_error(&error)))
 }
 
-/// Reads a file, text or binary, that does not begin with zeros alone.
-pub(crate) fn not_blank(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |start| {
+/// Reads a text or binary file. Rejects a file that starts with [`START`] zeros.
+pub(crate) fn not_all_zero(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, monitor, |start| {
         binary_if(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
     })
 }
 
-/// Reads a regular file, whose bytes may be any.
-pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |_| Ok(()))
+/// Reads a regular file of any content.
+pub(crate) fn bytes(path: &Path, limit: u64, monitor: Monitor<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, monitor, |_| Ok(()))
 }
 
 fn binary_if(path: &Path, is_binary: bool) -> Result<(), AssetError> {
-    let refused = || AssetError::malformed(path, Some(1), "this is a binary file of another kind");
+    let refused = || AssetError::malformed(path, Some(1), BINARY_FILE);
     if is_binary { Err(refused()) } else { Ok(()) }
 }
 
-/// Refuses a file that should be text and begins as UTF-16 does. Numbers of 16 bits may look the same: do not call this on files
-/// that may be binary.
+/// Rejects UTF-16 where a text file is expected. Must not be called for binary formats, whose 16-bit numbers
+/// can look like UTF-16.
 pub(crate) fn refuse_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
-    let refused = || AssetError::malformed(path, Some(1), "this is text in UTF-16; save it as UTF-8");
+    let refused = || AssetError::malformed(path, Some(1), UTF16_TEXT);
     if is_utf16(start) { Err(refused()) } else { Ok(()) }
 }
 
-/// Whether a file begins as text in UTF-16 does: two letters, each beside a byte 0, behind a mark or not.
+/// Whether a file starts like UTF-16 text: two ASCII characters, each with a zero byte, after an optional
+/// byte order mark.
 fn is_utf16(start: &[u8]) -> bool {
     let start = start.strip_prefix(b"\xff\xfe").or(start.strip_prefix(b"\xfe\xff")).unwrap_or(start);
     let is_letter = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
@@ -116,12 +127,12 @@ fn is_utf16(start: &[u8]) -> bool {
     }
 }
 
-/// Reads a regular file if its first [`START`] bytes are accepted. Progress counts bytes out of `2·length`: the second
-/// half is the parser's.
+/// Reads a regular file if `accept` does not reject its first [`START`] bytes. Progress counts bytes out of
+/// `2·length`: parsing is the second half.
 fn bytes_if(
     path: &Path,
     limit: u64,
-    watch: Watch<'_>,
+    monitor: Monitor<'_>,
     accept: impl Fn(&[u8]) -> Result<(), AssetError>,
 ) -> Result<Vec<u8>, AssetError> {
     let (mut file, length) = open(path, limit)?;
@@ -130,15 +141,15 @@ fn bytes_if(
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
     accept(&start)?;
     file.rewind().map_err(unreadable)?;
-    rest(path, file, (length, limit), watch)
+    rest(path, file, (length, limit), monitor)
 }
 
-/// Reads the rest of an open file, whose length is expected to be `length`. Progress counts as for [`bytes`].
+/// Reads the rest of an open file of about `length` bytes. Progress counts as for [`bytes`].
 pub(crate) fn rest(
     path: &Path,
     file: File,
     (length, limit): (u64, u64),
-    watch: Watch<'_>,
+    monitor: Monitor<'_>,
 ) -> Result<Vec<u8>, AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let mut file = file.take(limit);
@@ -147,7 +158,7 @@ pub(crate) fn rest(
     let out_of_memory = |_| AssetError::OutOfMemory { path: path.to_owned(), bytes: length };
     bytes.try_reserve_exact(length + 1).map_err(out_of_memory)?;
     loop {
-        watch.tick(bytes.len().min(length), 2 * length)?;
+        monitor.tick(bytes.len().min(length), 2 * length)?;
         let got = (&mut file).take(CHUNK as u64).read_to_end(&mut bytes).map_err(unreadable)?;
         if got == 0 {
             return Ok(bytes);
@@ -158,46 +169,48 @@ pub(crate) fn rest(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assets::rejection;
     use crate::control::ignore_progress;
     use std::fs;
     use std::sync::Mutex;
 
-    fn watch(token: &CancelToken) -> Watch<'_> {
-        Watch { progress: &ignore_progress, token }
+    fn monitor(token: &CancelToken) -> Monitor<'_> {
+        Monitor { progress: &ignore_progress, token }
     }
 
     #[test]
-    fn what_is_no_file_is_refused_in_words() {
+    fn special_missing_and_long_files_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
-        let says = |path: &Path| bytes(path, 100, watch(&token)).expect_err("refused").to_string();
-        assert!(says(folder.path()).contains("folder"));
-        assert!(says(&folder.path().join("none.obj")).contains("none.obj: no such file"));
+        let reason = |path: &Path| rejection(bytes(path, 100, monitor(&token))).1;
+        assert_eq!(reason(folder.path()), not_regular(FileKind::Folder));
+        let missing = std::io::Error::from_raw_os_error(nix::libc::ENOENT);
+        assert_eq!(reason(&folder.path().join("none.obj")), describe_error(&missing));
         let long = folder.path().join("long");
         fs::write(&long, [0; 101]).expect("written");
-        assert!(says(&long).contains("101 bytes"));
+        assert!(reason(&long).contains("101"));
     }
 
     #[test]
-    fn what_is_binary_is_told_by_its_start() {
+    fn binary_files_are_rejected_by_their_start() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("zeros");
         // 3 TiB without content: reading them would take an hour.
         File::create(&path).and_then(|file| file.set_len(3 << 40)).expect("a sparse file");
-        for read in [text, lettered] {
-            let error = read(&path, u64::MAX, watch(&token)).expect_err("refused").to_string();
-            assert!(error.ends_with("zeros:1: this is a binary file of another kind"), "{error}");
+        for read in [text, text_or_binary] {
+            let error = rejection(read(&path, u64::MAX, monitor(&token)));
+            assert_eq!(error, (Some(1), BINARY_FILE.to_owned()));
         }
         fs::write(&path, b"ply\n\0").expect("written");
-        assert!(text(&path, 100, watch(&token)).is_err());
-        assert_eq!(lettered(&path, 100, watch(&token)).expect("read"), b"ply\n\0");
+        assert!(text(&path, 100, monitor(&token)).is_err());
+        assert_eq!(text_or_binary(&path, 100, monitor(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
-        assert_eq!(text(&path, 100, watch(&token)).expect("read"), b"");
+        assert_eq!(text(&path, 100, monitor(&token)).expect("read"), b"");
     }
 
     #[test]
-    fn text_in_utf16_is_named() {
+    fn utf16_text_is_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("wide");
@@ -207,65 +220,63 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [text, lettered] {
-                    let error = read(&path, u64::MAX, watch(&token)).expect_err("refused").to_string();
-                    assert!(error.ends_with("wide:1: this is text in UTF-16; save it as UTF-8"), "{error}");
+                for read in [text, text_or_binary] {
+                    let error = rejection(read(&path, u64::MAX, monitor(&token)));
+                    assert_eq!(error, (Some(1), UTF16_TEXT.to_owned()));
                 }
             }
         }
     }
 
     #[test]
-    fn binary_files_may_begin_as_utf16_does() {
+    fn binary_files_may_look_like_utf16() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("numbers");
         for numbers in [[33_u16, 126, 40], [0xfeff, 65, 66]] {
             let content: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
             fs::write(&path, &content).expect("written");
-            for read in [bytes, not_blank] {
-                assert_eq!(read(&path, 100, watch(&token)).expect("numbers"), content);
+            for read in [bytes, not_all_zero] {
+                assert_eq!(read(&path, 100, monitor(&token)).expect("numbers"), content);
             }
         }
     }
 
     #[test]
-    fn pointers_of_git_lfs_are_named() {
+    fn git_lfs_pointers_are_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
         let path = folder.path().join("pointer");
         let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
         fs::write(&path, pointer).expect("written");
-        for read in [text, lettered, not_blank, bytes] {
-            let error = read(&path, 1 << 20, watch(&token)).expect_err("no content").to_string();
-            assert!(
-                error.ends_with("Git LFS pointer, not the file's content: run `git lfs pull`"),
-                "{error}"
-            );
+        for read in [text, text_or_binary, not_all_zero, bytes] {
+            let error = rejection(read(&path, 1 << 20, monitor(&token)));
+            assert_eq!(error, (None, LFS_POINTER.to_owned()));
         }
         fs::write(&path, format!("{pointer}{}", "x".repeat(1024))).expect("written");
-        assert!(bytes(&path, 1 << 20, watch(&token)).is_ok(), "pointers are short");
+        assert!(bytes(&path, 1 << 20, monitor(&token)).is_ok(), "pointers are short");
     }
 
     #[cfg(unix)]
     #[test]
-    fn pipes_and_loops_do_not_block() {
+    fn pipes_and_link_loops_do_not_block() {
         let folder = tempfile::tempdir().expect("a folder");
         let token = CancelToken::new();
-        let says = |path: &Path| bytes(path, 100, watch(&token)).expect_err("refused").to_string();
+        let reason = |path: &Path| rejection(bytes(path, 100, monitor(&token))).1;
         let pipe = folder.path().join("pipe");
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
-        assert!(says(&pipe).contains("pipe"));
-        assert!(says(Path::new("/dev/zero")).contains("device"));
+        assert_eq!(reason(&pipe), not_regular(FileKind::Special));
+        assert_eq!(reason(Path::new("/dev/zero")), not_regular(FileKind::Special));
         #[cfg(target_os = "linux")]
-        assert!(says(Path::new("/proc/kmsg")).contains("kernel file"));
-        let turn = folder.path().join("turn");
-        std::os::unix::fs::symlink(&turn, &turn).expect("a link");
-        assert!(says(&turn).contains("symbolic links form a loop"), "{}", says(&turn));
+        assert_eq!(reason(Path::new("/proc/kmsg")), not_regular(FileKind::Kernel));
+        let cycle = folder.path().join("cycle");
+        std::os::unix::fs::symlink(&cycle, &cycle).expect("a link");
+        let link_loop = std::io::Error::from_raw_os_error(nix::libc::ELOOP);
+        assert_eq!(reason(&cycle), describe_error(&link_loop));
     }
 
     #[test]
-    fn reading_reports_and_stops() {
+    fn reading_reports_progress_and_can_be_cancelled() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("some");
         fs::write(&path, vec![7; 3 * CHUNK]).expect("written");
@@ -277,7 +288,7 @@ mod tests {
                 token.cancel();
             }
         };
-        let result = bytes(&path, u64::MAX, Watch { progress: &note, token: &token });
+        let result = bytes(&path, u64::MAX, Monitor { progress: &note, token: &token });
         assert!(matches!(result, Err(AssetError::Cancelled(_))));
         let total = 6 * CHUNK as u64;
         let expected: Vec<_> = (0..3).map(|chunk| (chunk * CHUNK as u64, total)).collect();

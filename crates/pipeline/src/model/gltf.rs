@@ -12,7 +12,7 @@ use super::{
 };
 use crate::assets::gltf::{
     Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
-    ModelScene, Slot,
+    ModelScene, TexturedValue,
 };
 use crate::assets::{AssetError, Companion};
 use crate::control::{CancelToken, ignore_progress};
@@ -318,7 +318,7 @@ fn is_clear(material: &ModelMaterial) -> bool {
 
 /// Whether a material may cast caustics. A texture may have any value up to its factor.
 fn is_polished(material: &ModelMaterial) -> bool {
-    let is_smooth = |roughness: &Slot| roughness.texture.is_some() || roughness.factor.x < ROUGH;
+    let is_smooth = |roughness: &TexturedValue| roughness.texture.is_some() || roughness.factor.x < ROUGH;
     let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
     let is_coated = material.clearcoat.factor.x > 0.0 && is_smooth(&material.clearcoat_roughness);
     is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)

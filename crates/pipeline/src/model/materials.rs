@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::Unique;
 use super::toml::{Toml, color, key_name, number, pair};
-use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, Slot, TextureRef, TextureWrap};
+use crate::assets::gltf::{Alpha, ModelMaterial, ModelScene, TextureRef, TextureWrap, TexturedValue};
 use crate::math::{DVec3, Vec2};
 use crate::scene::quoted;
 
@@ -144,7 +144,7 @@ impl<F: Files> MaterialWriter<'_, F> {
     }
 
     /// Writes the opacity from an image's alpha. With a factor of 1, it shares the color's texture.
-    fn opacity(&mut self, keys: &mut TableKeys, value: &Slot, color: &Slot) {
+    fn opacity(&mut self, keys: &mut TableKeys, value: &TexturedValue, color: &TexturedValue) {
         match &value.texture {
             Some(texture) => {
                 // Without factors, one table serves both the color and its alpha.
@@ -162,7 +162,7 @@ impl<F: Files> MaterialWriter<'_, F> {
         }
     }
 
-    fn color(&mut self, keys: &mut TableKeys, (key, usual): (&'static str, f64), slot: &Slot) {
+    fn color(&mut self, keys: &mut TableKeys, (key, usual): (&'static str, f64), slot: &TexturedValue) {
         match &slot.texture {
             Some(texture) => {
                 let name = self.texture(texture, TextureUse::Colors, slot.factor);
@@ -180,7 +180,7 @@ impl<F: Files> MaterialWriter<'_, F> {
         &mut self,
         keys: &mut TableKeys,
         (key, usual): (&'static str, f64),
-        slot: &Slot,
+        slot: &TexturedValue,
         channel: &str,
     ) {
         match &slot.texture {

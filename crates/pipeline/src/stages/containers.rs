@@ -58,7 +58,7 @@ impl Containers {
         let container = self.open(path, progress, token)?;
         match part {
             Some(part) => container.part(part as usize, &ignore_progress, token),
-            None => container.whole(token),
+            None => container.merged_scene(token),
         }
     }
 

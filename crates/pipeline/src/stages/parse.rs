@@ -10,7 +10,7 @@ use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
 use super::{Findings, Staged, Stop};
-use crate::assets::gltf::{files_named, is_gltf};
+use crate::assets::gltf::{is_gltf, referenced_files};
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
@@ -221,7 +221,7 @@ fn referenced_files(loaded: &scene::Loaded) -> Vec<PathBuf> {
     }
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     for path in textures.into_iter().chain(&loaded.named).filter(|path| is_gltf(path) && !is_read(path)) {
-        named.extend(files_named(path).unwrap_or_default());
+        named.extend(referenced_files(path).unwrap_or_default());
     }
     named
 }

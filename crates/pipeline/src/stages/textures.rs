@@ -16,8 +16,8 @@ use super::meshes::Meshes;
 use super::{Counts, Findings, Reading, Staged, Stop, loading_result};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ColorCurve, ImageEncoding, ImageLimits, ImageWithin, LoadedImage, coverage, load_hashed, load_within,
-    mipmaps, size, size_within,
+    ColorCurve, EmbeddedImage, ImageEncoding, ImageLimits, LoadedImage, coverage, load_embedded, load_hashed,
+    mipmaps, size, size_embedded,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -509,9 +509,9 @@ fn decode(
             contents.0 = reading.contents.decoded(image.path(), hash);
             match input {
                 ImageInput::Bytes(bytes) => {
-                    let within = ImageWithin { path: image.path(), bytes };
+                    let within = EmbeddedImage { path: image.path(), bytes };
                     let load =
-                        |progress: Progress<'_>| load_within(within, encoding, limits, progress, token);
+                        |progress: Progress<'_>| load_embedded(within, encoding, limits, progress, token);
                     return reading.sink.asset(&one.name, load);
                 }
                 ImageInput::File(path) => {
@@ -546,7 +546,7 @@ fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u
     match input(source, reading)? {
         ImageInput::File(path) => size(&path, encoding, limits, reading.token),
         ImageInput::Bytes(bytes) => {
-            size_within(ImageWithin { path: &source.path, bytes }, encoding, limits, reading.token)
+            size_embedded(EmbeddedImage { path: &source.path, bytes }, encoding, limits, reading.token)
         }
     }
 }

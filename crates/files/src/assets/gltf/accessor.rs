@@ -1,15 +1,14 @@
-//! Numbers of accessors: typed views into buffers, with strides, normalised integers and sparse replacements
-//! (glTF 2.0, 3.6.2).
+//! Accessors: typed views of buffers, with strides, normalized integers and sparse values (glTF 2.0, 3.6.2).
 
 use super::json::{Accessor, BufferView};
-use super::{Container, Wrong};
+use super::{Container, GltfError};
 
-/// Most elements of an accessor that has no bytes of its own, which stand for zeros.
-const MOST_ZEROS: u64 = 1 << 22;
+/// Maximum number of elements of an accessor without a buffer view, whose elements are zero.
+const MAX_ZEROS: u64 = 1 << 22;
 
-/// The type of a component.
+/// Component type.
 #[derive(Clone, Copy, PartialEq)]
-enum Component {
+enum ComponentType {
     I8,
     U8,
     I16,
@@ -18,8 +17,8 @@ enum Component {
     F32,
 }
 
-impl Component {
-    fn of(number: u32) -> Option<Self> {
+impl ComponentType {
+    fn from_number(number: u32) -> Option<Self> {
         match number {
             5120 => Some(Self::I8),
             5121 => Some(Self::U8),
@@ -31,7 +30,7 @@ impl Component {
         }
     }
 
-    fn bytes(self) -> usize {
+    fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
@@ -39,11 +38,11 @@ impl Component {
         }
     }
 
-    /// The number in bytes of this component's size; normalised integers are in [0, 1] or [-1, 1] (3.6.2.2).
+    /// Decodes a component. Normalized integers are in [0, 1] or [-1, 1] (3.6.2.2).
     fn number(self, bytes: &[u8], normalized: bool) -> f32 {
         let word = || [bytes[0], bytes[1]];
         let long = || [bytes[0], bytes[1], bytes[2], bytes[3]];
-        let (value, most) = match self {
+        let (value, max) = match self {
             Self::I8 => (f32::from(bytes[0] as i8), 127.0),
             Self::U8 => (f32::from(bytes[0]), 255.0),
             Self::I16 => (f32::from(i16::from_le_bytes(word())), 32767.0),
@@ -51,10 +50,10 @@ impl Component {
             Self::U32 => (u32::from_le_bytes(long()) as f32, 4_294_967_295.0),
             Self::F32 => return f32::from_le_bytes(long()),
         };
-        if normalized { (value / most).max(-1.0) } else { value }
+        if normalized { (value / max).max(-1.0) } else { value }
     }
 
-    /// The whole number in bytes of this component's size.
+    /// Decodes a component as an index. `None` for types that cannot be indices.
     fn index(self, bytes: &[u8]) -> Option<u32> {
         match self {
             Self::U8 => Some(u32::from(bytes[0])),
@@ -65,7 +64,7 @@ impl Component {
     }
 }
 
-/// Number of components of a type.
+/// Number of components of an element type.
 fn components(kind: &str) -> Option<usize> {
     match kind {
         "SCALAR" => Some(1),
@@ -78,156 +77,168 @@ fn components(kind: &str) -> Option<usize> {
     }
 }
 
-/// Elements in a buffer, some bytes apart.
+/// Elements at regular distances in a buffer.
 #[derive(Clone, Copy)]
-struct Elements<'a> {
+struct StridedElements<'a> {
     bytes: &'a [u8],
     stride: usize,
 }
 
 /// A checked accessor.
-pub(super) struct Numbers<'a> {
-    component: Component,
+pub(super) struct AccessorReader<'a> {
+    component: ComponentType,
     normalized: bool,
-    /// Components of each element.
+    /// Components per element.
     pub(super) width: usize,
     /// Number of elements.
     pub(super) count: usize,
-    /// `None` for zeros.
-    elements: Option<Elements<'a>>,
-    /// Elements that are replaced, by rising index.
-    sparse: Option<(Vec<u32>, Elements<'a>)>,
+    /// `None` if all elements are zero.
+    elements: Option<StridedElements<'a>>,
+    /// Sparse values and their sorted indices.
+    sparse: Option<(Vec<u32>, StridedElements<'a>)>,
 }
 
-impl<'a> Numbers<'a> {
-    /// The accessor of a number.
-    pub(super) fn of(container: &'a Container, number: usize) -> Result<Self, Wrong> {
+impl<'a> AccessorReader<'a> {
+    /// Opens an accessor by its index.
+    pub(super) fn open(container: &'a Container, number: usize) -> Result<Self, GltfError> {
         let accessor = container.root.accessors.get(number);
         let accessor =
-            accessor.ok_or_else(|| Wrong::index("accessors", number, container.root.accessors.len()))?;
+            accessor.ok_or_else(|| GltfError::index("accessors", number, container.root.accessors.len()))?;
         Self::new(container, accessor).map_err(|wrong| wrong.inside(format!("accessors[{number}]")))
     }
 
-    fn new(container: &'a Container, accessor: &Accessor) -> Result<Self, Wrong> {
-        let component = Component::of(accessor.component_type)
-            .ok_or_else(|| Wrong::new(format!("there is no component type {}", accessor.component_type)))?;
+    fn new(container: &'a Container, accessor: &Accessor) -> Result<Self, GltfError> {
+        let component = ComponentType::from_number(accessor.component_type)
+            .ok_or_else(|| GltfError::new(format!("unknown component type {}", accessor.component_type)))?;
         let width = components(&accessor.kind)
-            .ok_or_else(|| Wrong::new(format!("there is no type {:?}", super::shown(&accessor.kind))))?;
-        let size = width * component.bytes();
+            .ok_or_else(|| GltfError::new(format!("unknown type {:?}", super::shown(&accessor.kind))))?;
+        let size = width * component.size();
         if accessor.count > u64::from(u32::MAX) {
-            return Err(Wrong::new(format!("it claims {} elements", accessor.count)));
+            return Err(GltfError::new(format!("it claims {} elements", accessor.count)));
         }
         let count = accessor.count as usize;
-        let own = match accessor.buffer_view {
+        let elements_of_view = match accessor.buffer_view {
             Some(view) => Some(elements(container, view, accessor.byte_offset, size, count)?),
-            None if accessor.count <= MOST_ZEROS => None,
+            None if accessor.count <= MAX_ZEROS => None,
             None => {
-                return Err(Wrong::new(format!(
-                    "{} elements without a buffer view, more than the {MOST_ZEROS} that are read",
-                    accessor.count
-                )));
+                return Err(GltfError::new(too_many_zeros(accessor.count)));
             }
         };
         let sparse = match &accessor.sparse {
             Some(sparse) => {
                 if sparse.count > accessor.count {
-                    return Err(Wrong::new(format!("it replaces {} of {count} elements", sparse.count)));
+                    return Err(GltfError::new(format!(
+                        "{} sparse values for {count} elements",
+                        sparse.count
+                    )));
                 }
                 let replaced = sparse.count as usize;
-                let places = &sparse.indices;
-                let of_index =
-                    Component::of(places.component_type).filter(|one| one.index(&[0; 4]).is_some());
-                let of_index = of_index
-                    .ok_or_else(|| Wrong::new("its sparse indices are not whole numbers".to_owned()))?;
+                let json = &sparse.indices;
+                let index_type = ComponentType::from_number(json.component_type);
+                let index_type = index_type.filter(|component| component.index(&[0; 4]).is_some());
+                let index_type =
+                    index_type.ok_or_else(|| GltfError::new("sparse indices must be integers"))?;
                 let indices =
-                    elements(container, places.buffer_view, places.byte_offset, of_index.bytes(), replaced)?;
+                    elements(container, json.buffer_view, json.byte_offset, index_type.size(), replaced)?;
                 let indices: Vec<u32> = (0..replaced)
-                    .filter_map(|place| of_index.index(&indices.bytes[place * indices.stride..]))
+                    .filter_map(|element| index_type.index(&indices.bytes[element * indices.stride..]))
                     .collect();
                 if indices.iter().any(|index| *index as usize >= count) || !indices.is_sorted() {
-                    return Err(Wrong::new("its sparse indices are out of range or not in order".to_owned()));
+                    return Err(GltfError::new("sparse indices are out of range or not sorted"));
                 }
                 let values = &sparse.values;
                 Some((indices, elements(container, values.buffer_view, values.byte_offset, size, replaced)?))
             }
             None => None,
         };
-        Ok(Self { component, normalized: accessor.normalized, width, count, elements: own, sparse })
+        Ok(Self {
+            component,
+            normalized: accessor.normalized,
+            width,
+            count,
+            elements: elements_of_view,
+            sparse,
+        })
     }
 
-    /// Bytes of an element; `None` for zeros.
+    /// Bytes of an element. `None` if it is zero.
     fn element(&self, index: usize) -> Option<&'a [u8]> {
         if let Some((indices, values)) = &self.sparse
-            && let Ok(place) = indices.binary_search(&(index as u32))
+            && let Ok(element) = indices.binary_search(&(index as u32))
         {
-            return Some(&values.bytes[place * values.stride..]);
+            return Some(&values.bytes[element * values.stride..]);
         }
         self.elements.map(|elements| &elements.bytes[index * elements.stride..])
     }
 
-    /// The first components of an element, which must exist; what it does not have is `missing`.
+    /// The first `N` components of an element, which must exist. Missing components are `missing`.
     pub(super) fn floats<const N: usize>(&self, index: usize, missing: f32) -> [f32; N] {
-        let (size, element) = (self.component.bytes(), self.element(index));
-        std::array::from_fn(|place| match element {
-            _ if place >= self.width => missing,
-            Some(bytes) => self.component.number(&bytes[place * size..], self.normalized),
+        let (size, element) = (self.component.size(), self.element(index));
+        std::array::from_fn(|component| match element {
+            _ if component >= self.width => missing,
+            Some(bytes) => self.component.number(&bytes[component * size..], self.normalized),
             None => 0.0,
         })
     }
 
-    /// Whether these are indices.
+    /// Whether the elements can be used as indices.
     pub(super) fn are_indices(&self) -> bool {
         self.width == 1 && self.component.index(&[0; 4]).is_some()
     }
 
-    /// An index, which must exist.
-    pub(super) fn index(&self, place: usize) -> u32 {
-        self.element(place).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
+    /// An index at `element`, which must exist.
+    pub(super) fn index(&self, element: usize) -> u32 {
+        self.element(element).and_then(|bytes| self.component.index(bytes)).unwrap_or_default()
     }
 }
 
-/// The bytes of some elements of a size in a view.
+/// Locates `count` elements of `size` bytes in a buffer view.
 fn elements<'a>(
     container: &'a Container,
     view: usize,
     offset: u64,
     size: usize,
     count: usize,
-) -> Result<Elements<'a>, Wrong> {
+) -> Result<StridedElements<'a>, GltfError> {
     let views = &container.root.buffer_views;
     let place = format!("bufferViews[{view}]");
-    let json = views.get(view).ok_or_else(|| Wrong::index("bufferViews", view, views.len()))?;
+    let json = views.get(view).ok_or_else(|| GltfError::index("bufferViews", view, views.len()))?;
     let bytes = view_bytes(container, json).map_err(|wrong| wrong.inside(place.clone()))?;
     let stride = json.byte_stride.unwrap_or(size as u64);
     if stride < size as u64 || stride > 1 << 16 {
-        return Err(Wrong::new(format!("a stride of {stride} bytes for elements of {size}")).inside(place));
+        return Err(GltfError::new(format!("invalid stride of {stride} bytes for elements of {size} bytes"))
+            .inside(place));
     }
     let stride = stride as usize;
     let needed = if count == 0 { 0 } else { (count as u64 - 1) * stride as u64 + size as u64 };
     let end = offset.checked_add(needed).filter(|end| *end <= bytes.len() as u64);
     if end.is_none() {
-        let has = bytes.len();
-        return Err(Wrong::new(format!(
-            "{count} elements from byte {offset} need {needed} bytes of {place}, which has {has}"
-        )));
+        return Err(GltfError::new(view_too_short(count, offset, needed, &place, bytes.len())));
     }
-    Ok(Elements { bytes: &bytes[offset as usize..], stride })
+    Ok(StridedElements { bytes: &bytes[offset as usize..], stride })
 }
 
-/// The bytes of a view.
-pub(super) fn view_bytes<'a>(container: &'a Container, view: &BufferView) -> Result<&'a [u8], Wrong> {
+/// Bytes of a buffer view.
+pub(super) fn view_bytes<'a>(container: &'a Container, view: &BufferView) -> Result<&'a [u8], GltfError> {
     let buffers = &container.buffers;
     let buffer =
-        buffers.get(view.buffer).ok_or_else(|| Wrong::index("buffers", view.buffer, buffers.len()))?;
+        buffers.get(view.buffer).ok_or_else(|| GltfError::index("buffers", view.buffer, buffers.len()))?;
     let end = view.byte_offset.checked_add(view.byte_length).filter(|end| *end <= buffer.len() as u64);
-    let end = end.ok_or_else(|| {
-        Wrong::new(format!(
-            "bytes {} + {} of buffers[{}], which has {}",
-            view.byte_offset,
-            view.byte_length,
-            view.buffer,
-            buffer.len()
-        ))
-    })?;
+    let end = end.ok_or_else(|| GltfError::new(beyond_buffer(view, buffer.len())))?;
     Ok(&buffer[view.byte_offset as usize..end as usize])
+}
+
+pub(super) fn too_many_zeros(count: u64) -> String {
+    format!("{count} elements without a buffer view; the limit is {MAX_ZEROS}")
+}
+
+/// Reason to reject elements that exceed their buffer view.
+pub(super) fn view_too_short(count: usize, offset: u64, needed: u64, view: &str, has: usize) -> String {
+    format!("{count} elements from byte {offset} need {needed} bytes of {view}, which has {has}")
+}
+
+/// Reason to reject a view that exceeds its buffer.
+fn beyond_buffer(view: &BufferView, has: usize) -> String {
+    let BufferView { buffer, byte_offset, byte_length, .. } = view;
+    format!("bytes {byte_offset} + {byte_length} exceed buffers[{buffer}], which has {has}")
 }

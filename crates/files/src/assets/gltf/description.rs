@@ -1,191 +1,191 @@
-//! The content of a glTF file, in the terms of scenes.
+//! Contents of a glTF file in the terms of glimt's scenes.
 
 use crate::math::{DMat3, DVec3, Vec2};
 
-/// The content of a file that is seen.
+/// The visible contents of a file.
 #[derive(Debug, Default)]
 pub struct ModelScene {
-    /// Placed parts, in the order of the nodes.
+    /// Placed parts, in node order.
     pub instances: Vec<ModelInstance>,
-    /// Materials that instances use.
+    /// Materials used by instances.
     pub materials: Vec<ModelMaterial>,
-    /// Names of the images, which may be empty.
+    /// Names of the images, possibly empty.
     pub images: Vec<String>,
-    /// Lights that nodes place.
+    /// Lights placed by nodes.
     pub lights: Vec<ModelLight>,
-    /// Cameras that nodes place.
+    /// Cameras placed by nodes.
     pub cameras: Vec<ModelCamera>,
-    /// Approximations, each with its place in the file.
+    /// Notes about approximations and omissions, with their location in the file.
     pub notes: Vec<String>,
-    /// Least and greatest coordinates of all instances. `None` without one.
+    /// Minimum and maximum coordinates of all instances. `None` without instances.
     pub bounds: Option<[DVec3; 2]>,
-    /// Points of the instances, some of them far out in every direction.
+    /// Some points of the instances, including extreme ones in every direction.
     pub outline: Vec<DVec3>,
 }
 
-/// An affine map.
+/// An affine transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
-    /// Images of the axes.
+pub struct AffineMap {
+    /// Linear part.
     pub linear: DMat3,
-    /// Image of the origin.
+    /// Translation.
     pub translate: DVec3,
 }
 
-impl Placed {
+impl AffineMap {
     pub(super) const IDENTITY: Self = Self { linear: DMat3::IDENTITY, translate: DVec3::ZERO };
 
-    /// This map after another.
+    /// Composition that applies `inner` first.
     pub(super) fn after(self, inner: Self) -> Self {
         Self { linear: self.linear * inner.linear, translate: self.point(inner.translate) }
     }
 
-    /// The image of a point.
+    /// Transforms a point.
     pub fn point(&self, at: DVec3) -> DVec3 {
         self.linear * at + self.translate
     }
 }
 
-/// A part at its place.
+/// A part placed by a node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelInstance {
-    /// Name of its node or its mesh; may be empty.
+    /// Name of the node or its mesh, possibly empty.
     pub name: String,
-    /// Number of its node.
+    /// Index of the node.
     pub node: usize,
-    /// Number of its part.
+    /// Index of the part.
     pub part: usize,
-    /// Its placement.
-    pub placed: Placed,
+    /// Transform to scene coordinates.
+    pub placed: AffineMap,
     /// Index into [`ModelScene::materials`].
     pub material: usize,
-    /// Whether its vertices have normals.
+    /// Whether the vertices have normals.
     pub has_normals: bool,
-    /// Whether its vertices have colours.
+    /// Whether the vertices have colors.
     pub has_colors: bool,
 }
 
-/// A number or a colour: a factor, by which a texture is multiplied.
+/// A scalar or color factor, optionally multiplied by a texture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Slot {
-    /// The factor; a number in all three.
+pub struct TexturedValue {
+    /// The factor. A scalar is stored in all components.
     pub factor: DVec3,
-    /// The texture.
+    /// Texture that the factor scales.
     pub texture: Option<TextureRef>,
 }
 
-impl Slot {
-    /// A number without a texture.
+impl TexturedValue {
+    /// A scalar without a texture.
     pub fn number(number: f64) -> Self {
         Self { factor: DVec3::splat(number), texture: None }
     }
 }
 
-/// Continuation of a texture outside [0, 1].
+/// Wrap mode of a texture outside [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureWrap {
     /// Periodic.
     Repeat,
-    /// The border's texels.
+    /// Repeats the edge texels.
     Clamp,
-    /// Periodic, every second tile mirrored.
+    /// Repeats the texture, mirroring every second tile.
     Mirror,
 }
 
-/// An image with its look-up. Coordinates count v from the bottom; they are repeated, rotated, then moved.
+/// A texture lookup. v is 0 at the bottom; coordinates are scaled, then rotated, then translated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureRef {
-    /// Number of the image.
+    /// Index of the image.
     pub image: usize,
-    /// Whether texels are shown without interpolation.
+    /// Whether the nearest texel is used, without interpolation.
     pub is_nearest: bool,
-    /// Continuation outside [0, 1].
+    /// Wrap mode outside [0, 1].
     pub wrap: TextureWrap,
-    /// Whether it has the second set of coordinates of a part.
+    /// Whether the lookup uses the part's second set of texture coordinates.
     pub is_second: bool,
-    /// Repetitions; not 0.
+    /// Scale of the coordinates, never 0.
     pub repeat: Vec2,
-    /// Angle in degrees from u to v.
+    /// Rotation angle in degrees, from u to v.
     pub rotate: f64,
-    /// Offset.
+    /// Translation.
     pub offset: Vec2,
 }
 
-/// The chance that a surface is there.
+/// Opacity of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Alpha {
-    /// It is there.
+    /// Fully opaque.
     Opaque,
-    /// It is there from a value on.
+    /// Opaque where the value reaches the cutoff, otherwise invisible.
     Mask {
-        /// The chance, by the alpha of a texture.
-        value: Slot,
-        /// The value from which on the surface is there.
+        /// Opacity, from the alpha of the texture.
+        value: TexturedValue,
+        /// Minimum opacity of visible points.
         cutoff: f64,
     },
-    /// It is there by chance.
-    Blend(Slot),
+    /// Partially transparent.
+    Blend(TexturedValue),
 }
 
-/// Glass that fills its shape.
+/// Solid glass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glass {
-    /// Transmittance per unit of length.
+    /// Transmittance per unit of distance.
     pub tint: DVec3,
 }
 
-/// A material in the terms of `principled`.
+/// A material with the parameters of `principled`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelMaterial {
-    /// Its name; may be empty.
+    /// Name, possibly empty.
     pub name: String,
-    /// Base colour.
-    pub color: Slot,
-    /// Weight of the metal: the blue of its texture.
-    pub metallic: Slot,
-    /// Roughness: the green of its texture.
-    pub roughness: Slot,
+    /// Base color.
+    pub color: TexturedValue,
+    /// Metallic weight, from the texture's blue channel.
+    pub metallic: TexturedValue,
+    /// Roughness, from the texture's green channel.
+    pub roughness: TexturedValue,
     /// Index of refraction.
     pub ior: f64,
-    /// Factor on the specular reflection: the alpha of its texture.
-    pub specular: Slot,
-    /// Colour of the specular reflection at normal incidence.
-    pub specular_color: Slot,
-    /// Transmission: the red of its texture.
-    pub transmission: Slot,
-    /// Weight of the clear coat: the red of its texture.
-    pub clearcoat: Slot,
-    /// Roughness of the clear coat: the green of its texture.
-    pub clearcoat_roughness: Slot,
-    /// Radiance.
-    pub emission: Slot,
+    /// Scale of the specular reflection, from the texture's alpha.
+    pub specular: TexturedValue,
+    /// Color of the specular reflection at normal incidence.
+    pub specular_color: TexturedValue,
+    /// Transmission, from the texture's red channel.
+    pub transmission: TexturedValue,
+    /// Clear coat weight, from the texture's red channel.
+    pub clearcoat: TexturedValue,
+    /// Clear coat roughness, from the texture's green channel.
+    pub clearcoat_roughness: TexturedValue,
+    /// Emitted radiance.
+    pub emission: TexturedValue,
     /// Normal map.
     pub normal: Option<TextureRef>,
-    /// Factor on the slopes of the normal map.
+    /// Scale of the normal map's slopes.
     pub normal_strength: f64,
-    /// The chance that it is there.
+    /// Opacity.
     pub alpha: Alpha,
-    /// Whether both sides are shown, and emit.
+    /// Whether both sides are visible and emit.
     pub is_two_sided: bool,
-    /// Glass in place of all else but the roughness.
+    /// Solid glass, which replaces everything except the roughness.
     pub glass: Option<Glass>,
 }
 
 impl ModelMaterial {
-    /// Grey without a metal's or a mirror's reflection.
+    /// A gray dielectric material.
     pub(super) fn named(name: &str) -> Self {
         Self {
             name: name.to_owned(),
-            color: Slot::number(0.8),
-            metallic: Slot::number(0.0),
-            roughness: Slot::number(0.5),
+            color: TexturedValue::number(0.8),
+            metallic: TexturedValue::number(0.0),
+            roughness: TexturedValue::number(0.5),
             ior: 1.5,
-            specular: Slot::number(1.0),
-            specular_color: Slot::number(1.0),
-            transmission: Slot::number(0.0),
-            clearcoat: Slot::number(0.0),
-            clearcoat_roughness: Slot::number(0.0),
-            emission: Slot::number(0.0),
+            specular: TexturedValue::number(1.0),
+            specular_color: TexturedValue::number(1.0),
+            transmission: TexturedValue::number(0.0),
+            clearcoat: TexturedValue::number(0.0),
+            clearcoat_roughness: TexturedValue::number(0.0),
+            emission: TexturedValue::number(0.0),
             normal: None,
             normal_strength: 1.0,
             alpha: Alpha::Opaque,
@@ -195,66 +195,66 @@ impl ModelMaterial {
     }
 }
 
-/// A light without extent (`KHR_lights_punctual`).
+/// A punctual light (`KHR_lights_punctual`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelLight {
-    /// Its name; may be empty.
+    /// Name, possibly empty.
     pub name: String,
-    /// Kind.
+    /// Type of the light.
     pub kind: ModelLightKind,
-    /// Intensity in cd, of directional lights illuminance in lx, for red, green and blue.
+    /// Intensity in cd, or illuminance in lx for directional lights, for red, green and blue.
     pub intensity: DVec3,
     /// Its place.
     pub position: DVec3,
-    /// The way that its light travels.
+    /// Direction in which the light travels.
     pub direction: DVec3,
 }
 
-/// Kind of a light.
+/// Type of a punctual light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ModelLightKind {
-    /// Light in all directions.
+    /// Emits in all directions.
     Point,
-    /// A cone.
+    /// Emits in a cone.
     Spot {
-        /// Whole angle in degrees.
+        /// Full cone angle in degrees.
         angle: f64,
-        /// Part of the half angle over which it fades.
+        /// Fraction of the half angle over which the light fades out.
         blend: f64,
     },
-    /// From one direction.
+    /// Parallel light.
     Directional,
 }
 
 /// A perspective camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelCamera {
-    /// Its name; may be empty.
+    /// Name, possibly empty.
     pub name: String,
     /// The eye.
     pub position: DVec3,
-    /// The way that it looks, a unit vector.
+    /// Viewing direction, a unit vector.
     pub direction: DVec3,
-    /// The direction that is up in the picture.
+    /// Up direction in the image.
     pub up: DVec3,
-    /// Vertical angle in degrees.
+    /// Vertical field of view in degrees.
     pub fov: f64,
-    /// Width over height. `None` if the file leaves it open.
+    /// Aspect ratio (width / height). `None` if the file does not specify it.
     pub aspect: Option<f64>,
 }
 
-/// Notes, each once.
+/// Deduplicated notes.
 #[derive(Debug, Default)]
 pub(super) struct Notes(pub(super) Vec<String>);
 
 impl Notes {
-    /// Most notes of a file.
-    const MOST: usize = 200;
+    /// Maximum number of notes per file.
+    const LIMIT: usize = 200;
 
-    /// Adds a note about a place.
+    /// Adds a note about an element of the file.
     pub(super) fn add(&mut self, place: &str, what: &str) {
         let note = format!("{place}: {what}");
-        if !self.0.contains(&note) && self.0.len() < Self::MOST {
+        if !self.0.contains(&note) && self.0.len() < Self::LIMIT {
             self.0.push(note);
         }
     }

@@ -1,5 +1,5 @@
-//! The JSON of a glTF 2.0 file, as far as glimt uses it (Khronos, *glTF 2.0 Specification*). Nothing is checked here but the
-//! types: whoever follows an index checks it.
+//! JSON schema of the parts of glTF 2.0 that glimt uses (Khronos, *glTF 2.0 Specification*). Only types are
+//! checked here; indices are checked where they are used.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -10,24 +10,24 @@ use base64::{DecodeError, Engine};
 use serde::de::{self, Deserializer, IgnoredAny, Visitor};
 use serde::{Deserialize, de::Error};
 
-/// The whole file.
+/// Root object of the file.
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Root {
-    pub(super) asset: Asset,
+    pub(super) asset: JsonAsset,
     pub(super) extensions_required: Vec<String>,
     pub(super) scene: Option<usize>,
-    pub(super) scenes: Vec<Scene>,
-    pub(super) nodes: Vec<Node>,
-    pub(super) meshes: Vec<Mesh>,
+    pub(super) scenes: Vec<JsonScene>,
+    pub(super) nodes: Vec<JsonNode>,
+    pub(super) meshes: Vec<JsonMesh>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) buffer_views: Vec<BufferView>,
     pub(super) buffers: Vec<Buffer>,
-    pub(super) materials: Vec<Material>,
-    pub(super) textures: Vec<Texture>,
+    pub(super) materials: Vec<JsonMaterial>,
+    pub(super) textures: Vec<JsonTexture>,
     pub(super) samplers: Vec<Sampler>,
-    pub(super) images: Vec<Image>,
-    pub(super) cameras: Vec<Camera>,
+    pub(super) images: Vec<JsonImage>,
+    pub(super) cameras: Vec<JsonCamera>,
     pub(super) skins: Vec<Skin>,
     pub(super) animations: Vec<IgnoredAny>,
     pub(super) extensions: RootExtensions,
@@ -35,9 +35,9 @@ pub(super) struct Root {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Asset {
+pub(super) struct JsonAsset {
     pub(super) version: String,
-    /// The least version of which all must be read. Empty for any.
+    /// Minimum version that a reader must support. Empty if unspecified.
     #[serde(rename = "minVersion")]
     pub(super) min_version: String,
 }
@@ -46,42 +46,42 @@ pub(super) struct Asset {
 #[serde(default)]
 pub(super) struct RootExtensions {
     #[serde(rename = "KHR_lights_punctual")]
-    pub(super) lights: Lights,
+    pub(super) lights: JsonLights,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Lights {
-    pub(super) lights: Vec<Light>,
+pub(super) struct JsonLights {
+    pub(super) lights: Vec<JsonLight>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(default)]
-pub(super) struct Light {
+pub(super) struct JsonLight {
     pub(super) name: String,
     #[serde(rename = "type")]
     pub(super) kind: String,
     pub(super) color: [f64; 3],
     pub(super) intensity: f64,
     pub(super) range: Option<f64>,
-    pub(super) spot: Spot,
+    pub(super) spot: JsonSpot,
 }
 
-impl Default for Light {
+impl Default for JsonLight {
     fn default() -> Self {
-        let (name, kind, spot) = (String::new(), String::new(), Spot::default());
+        let (name, kind, spot) = (String::new(), String::new(), JsonSpot::default());
         Self { name, kind, color: [1.0; 3], intensity: 1.0, range: None, spot }
     }
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(super) struct Spot {
+pub(super) struct JsonSpot {
     pub(super) inner_cone_angle: f64,
     pub(super) outer_cone_angle: f64,
 }
 
-impl Default for Spot {
+impl Default for JsonSpot {
     fn default() -> Self {
         Self { inner_cone_angle: 0.0, outer_cone_angle: std::f64::consts::FRAC_PI_4 }
     }
@@ -89,13 +89,13 @@ impl Default for Spot {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Scene {
+pub(super) struct JsonScene {
     pub(super) nodes: Vec<usize>,
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Node {
+pub(super) struct JsonNode {
     pub(super) name: String,
     pub(super) children: Vec<usize>,
     pub(super) mesh: Option<usize>,
@@ -139,7 +139,7 @@ pub(super) struct NodeLight {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Mesh {
+pub(super) struct JsonMesh {
     pub(super) name: String,
     pub(super) primitives: Vec<Primitive>,
     pub(super) weights: Vec<f64>,
@@ -155,7 +155,7 @@ pub(super) struct Primitive {
     pub(super) extensions: BTreeMap<String, IgnoredAny>,
 }
 
-/// The mode of separate triangles.
+/// Primitive mode of separate triangles.
 pub(super) const TRIANGLES: u32 = 4;
 
 impl Default for Primitive {
@@ -224,25 +224,25 @@ pub(super) struct Buffer {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(super) struct Image {
+pub(super) struct JsonImage {
     pub(super) name: String,
     pub(super) uri: Option<Uri>,
     pub(super) buffer_view: Option<usize>,
 }
 
-/// A place of bytes.
+/// A URI.
 #[derive(Debug)]
 pub(super) enum Uri {
-    /// The bytes themselves, decoded.
+    /// Decoded bytes of a data URI.
     Data(Vec<u8>),
-    /// A reference to a file, as it is written.
+    /// A file reference, as written.
     File(String),
 }
 
 impl<'de> Deserialize<'de> for Uri {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Reader;
-        impl Visitor<'_> for Reader {
+        struct UriVisitor;
+        impl Visitor<'_> for UriVisitor {
             type Value = Uri;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -259,11 +259,11 @@ impl<'de> Deserialize<'de> for Uri {
                 decoded(coded).map(Uri::Data).map_err(E::custom)
             }
         }
-        deserializer.deserialize_str(Reader)
+        deserializer.deserialize_str(UriVisitor)
     }
 }
 
-/// Base64 as data URIs have it (RFC 4648, section 4); the padding may be missing.
+/// Base64 of data URIs (RFC 4648, section 4). Padding is optional.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
@@ -271,17 +271,19 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 
 fn decoded(coded: &str) -> Result<Vec<u8>, String> {
     BASE64.decode(coded).map_err(|error| match error {
-        DecodeError::InvalidByte(at, byte) => format!("byte {byte:#04x} at {at} is no digit of base64"),
-        DecodeError::InvalidLength(digits) => format!("base64 of {digits} digits"),
-        DecodeError::InvalidLastSymbol { .. } | DecodeError::InvalidPadding => {
-            "base64 that ends in the middle of a byte".to_owned()
-        }
+        DecodeError::InvalidByte(at, byte) => invalid_base64(byte, at),
+        DecodeError::InvalidLength(digits) => format!("invalid base64 length of {digits} digits"),
+        DecodeError::InvalidLastSymbol { .. } | DecodeError::InvalidPadding => "truncated base64".to_owned(),
     })
+}
+
+pub(super) fn invalid_base64(byte: u8, at: usize) -> String {
+    format!("invalid base64 byte {byte:#04x} at {at}")
 }
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(super) struct Texture {
+pub(super) struct JsonTexture {
     pub(super) sampler: Option<usize>,
     pub(super) source: Option<usize>,
     pub(super) extensions: TextureExtensions,
@@ -315,7 +317,7 @@ impl Default for Sampler {
     }
 }
 
-/// Wrapping modes and the filter without interpolation, by their numbers in OpenGL.
+/// OpenGL numbers of wrap modes and of the nearest filter.
 pub(super) const REPEAT: u32 = 10497;
 pub(super) const CLAMP: u32 = 33071;
 pub(super) const MIRROR: u32 = 33648;
@@ -327,7 +329,7 @@ pub(super) struct TextureInfo {
     pub(super) index: usize,
     #[serde(default)]
     pub(super) tex_coord: usize,
-    /// Factor on the slopes of a normal map.
+    /// Scale of the slopes of a normal map.
     #[serde(default = "one")]
     pub(super) scale: f64,
     #[serde(default)]
@@ -362,7 +364,7 @@ fn one() -> f64 {
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(super) struct Material {
+pub(super) struct JsonMaterial {
     pub(super) name: String,
     pub(super) pbr_metallic_roughness: Pbr,
     pub(super) normal_texture: Option<TextureInfo>,
@@ -375,7 +377,7 @@ pub(super) struct Material {
     pub(super) extensions: Extensions,
 }
 
-impl Default for Material {
+impl Default for JsonMaterial {
     fn default() -> Self {
         Self {
             name: String::new(),
@@ -413,7 +415,7 @@ impl Default for Pbr {
     }
 }
 
-/// The extensions of a material: those that glimt reads, and the names of the others.
+/// Extensions of a material: those that glimt supports, and the names of the others.
 #[derive(Debug, Default)]
 pub(super) struct Extensions {
     pub(super) ior: Option<Ior>,
@@ -428,8 +430,8 @@ pub(super) struct Extensions {
 }
 
 fn material_extensions<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Extensions, D::Error> {
-    struct Reader;
-    impl<'de> Visitor<'de> for Reader {
+    struct ExtensionsVisitor;
+    impl<'de> Visitor<'de> for ExtensionsVisitor {
         type Value = Extensions;
 
         fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -460,16 +462,16 @@ fn material_extensions<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Ext
             Ok(all)
         }
     }
-    deserializer.deserialize_map(Reader)
+    deserializer.deserialize_map(ExtensionsVisitor)
 }
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Ior {
-    #[serde(default = "usual_ior")]
+    #[serde(default = "default_ior")]
     pub(super) ior: f64,
 }
 
-fn usual_ior() -> f64 {
+fn default_ior() -> f64 {
     1.5
 }
 
@@ -548,7 +550,7 @@ impl Default for Glossiness {
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
-pub(super) struct Camera {
+pub(super) struct JsonCamera {
     pub(super) name: String,
     pub(super) perspective: Option<Perspective>,
     pub(super) orthographic: Option<Orthographic>,

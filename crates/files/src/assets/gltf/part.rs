@@ -1,28 +1,28 @@
-//! A part of a glTF file: a primitive as a mesh in its own coordinates (glTF 2.0, 3.7.2).
+//! Builds a part of a glTF file: a primitive as a mesh in its local coordinates (glTF 2.0, 3.7.2).
 
-use super::accessor::Numbers;
+use super::accessor::AccessorReader;
 use super::json::{Primitive, TRIANGLES};
-use super::{Container, Wrong};
-use crate::assets::mesh::Source;
+use super::{Container, GltfError};
 use crate::assets::mesh::assemble::assemble;
-use crate::assets::mesh::parsed::{Faces, Parsed};
-use crate::assets::read::Watch;
+use crate::assets::mesh::parsed::{Faces, ParsedMesh};
+use crate::assets::mesh::{MeshSource, vertex_out_of_range};
+use crate::assets::read::Monitor;
 use crate::assets::{AssetError, LoadedMesh};
 use crate::control::{CancelToken, Progress};
 use crate::math::color::linear_to_srgb8;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// The modes of primitives that have faces, beside [`TRIANGLES`].
+/// Modes of primitives with faces, in addition to [`TRIANGLES`].
 const STRIP: u32 = 5;
 const FAN: u32 = 6;
 
 impl Primitive {
-    /// Whether it has faces, not points or lines.
+    /// Whether the primitive has faces, rather than points or lines.
     pub(super) fn has_faces(&self) -> bool {
         [TRIANGLES, STRIP, FAN].contains(&self.mode)
     }
 
-    /// Corners of the triangles that a list of so many corners makes in its mode.
+    /// Number of triangle corners made from `count` vertices in this mode.
     pub(super) fn corners_built(&self, count: u64) -> u64 {
         match self.mode {
             TRIANGLES => count,
@@ -33,11 +33,11 @@ impl Primitive {
 }
 
 impl Container {
-    /// The primitive of a number over all meshes, with its place.
+    /// The primitive of a part, and its location in the file.
     pub(super) fn primitive(&self, part: usize) -> Option<(String, &Primitive)> {
         let mut first = 0;
         for (mesh, json) in self.root.meshes.iter().enumerate() {
-            if let Some(primitive) = part.checked_sub(first).and_then(|place| json.primitives.get(place)) {
+            if let Some(primitive) = part.checked_sub(first).and_then(|index| json.primitives.get(index)) {
                 return Some((format!("meshes[{mesh}].primitives[{}]", part - first), primitive));
             }
             first += json.primitives.len();
@@ -50,10 +50,10 @@ impl Container {
         self.root.meshes.iter().map(|mesh| mesh.primitives.len()).sum()
     }
 
-    /// A part as a mesh, without materials.
+    /// Builds a part as a mesh without materials.
     ///
     /// # Errors
-    /// [`AssetError::Malformed`] with the place in the JSON; [`AssetError::Cancelled`].
+    /// [`AssetError::Malformed`] with the location in the JSON; [`AssetError::Cancelled`].
     pub fn part(
         &self,
         part: usize,
@@ -61,10 +61,10 @@ impl Container {
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
         let Some((place, primitive)) = self.primitive(part) else {
-            return Err(self.wrong(Wrong::index("part", part, self.parts())));
+            return Err(self.wrong(GltfError::index("part", part, self.parts())));
         };
         let parsed = self.parsed(primitive).map_err(|wrong| self.wrong(wrong.inside(place.clone())))?;
-        let source = Source { path: &self.path, bytes: &[], watch: Watch { progress, token } };
+        let source = MeshSource { path: &self.path, bytes: &[], monitor: Monitor { progress, token } };
         let mut loaded = assemble(&source, parsed).map_err(|error| match error {
             AssetError::Malformed { path, line, reason } => {
                 AssetError::Malformed { path, line, reason: format!("{place}: {reason}") }
@@ -76,32 +76,32 @@ impl Container {
         Ok(loaded)
     }
 
-    fn parsed(&self, primitive: &Primitive) -> Result<Parsed, Wrong> {
+    fn parsed(&self, primitive: &Primitive) -> Result<ParsedMesh, GltfError> {
         if primitive.extensions.contains_key(super::DRACO) {
-            return Err(Wrong::new("its faces are compressed by Draco, which this version does not read"));
+            return Err(GltfError::new("Draco compression is not supported"));
         }
         if !primitive.has_faces() {
-            return Err(Wrong::new("points and lines have no faces"));
+            return Err(GltfError::new("points and lines have no faces"));
         }
-        // Find the vertices of the corners.
+        // Find the vertex of each corner.
         let positions = self.attribute(primitive, "POSITION")?;
-        let positions = positions.ok_or_else(|| Wrong::new("it has no positions"))?;
+        let positions = positions.ok_or_else(|| GltfError::new("it has no positions"))?;
         if positions.width != 3 {
             let width = positions.width;
-            let reason = format!("a position has three numbers (VEC3), and here {width}");
-            return Err(Wrong::new(reason).inside("POSITION"));
+            let reason = wrong_width(width);
+            return Err(GltfError::new(reason).inside("POSITION"));
         }
         let (corners, vertices) = self.corners(primitive, positions.count)?;
-        // Read what the vertices have.
-        let is_whole = |numbers: &Numbers<'_>| numbers.count >= positions.count;
-        let normals = self.attribute(primitive, "NORMAL")?.filter(is_whole);
+        // Read the vertex attributes.
+        let is_complete = |numbers: &AccessorReader<'_>| numbers.count >= positions.count;
+        let normals = self.attribute(primitive, "NORMAL")?.filter(is_complete);
         let mut sets = Vec::with_capacity(2);
         for set in self.coordinate_sets(primitive) {
-            sets.push(self.attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_whole));
+            sets.push(self.attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_complete));
         }
-        let colors = self.attribute(primitive, "COLOR_0")?.filter(is_whole);
+        let colors = self.attribute(primitive, "COLOR_0")?.filter(is_complete);
         let each = || vertices.iter().map(|vertex| *vertex as usize);
-        let mut parsed = Parsed { faces: faces(primitive.mode, &corners), ..Parsed::default() };
+        let mut parsed = ParsedMesh { faces: faces(primitive.mode, &corners), ..ParsedMesh::default() };
         parsed.positions =
             each().map(|vertex| DVec3::from(positions.floats::<3>(vertex, 0.0).map(f64::from))).collect();
         if let Some(normals) = normals {
@@ -122,14 +122,18 @@ impl Container {
         Ok(parsed)
     }
 
-    /// An attribute of a primitive.
-    pub(super) fn attribute(&self, primitive: &Primitive, name: &str) -> Result<Option<Numbers<'_>>, Wrong> {
+    /// Opens an attribute of a primitive, if it has one.
+    pub(super) fn attribute(
+        &self,
+        primitive: &Primitive,
+        name: &str,
+    ) -> Result<Option<AccessorReader<'_>>, GltfError> {
         let Some(&number) = primitive.attributes.get(name) else { return Ok(None) };
-        Numbers::of(self, number).map(Some).map_err(|wrong| wrong.inside(name))
+        AccessorReader::open(self, number).map(Some).map_err(|wrong| wrong.inside(name))
     }
 
-    /// The two sets of texture coordinates of a primitive's mesh: those that the textures of its material use, the lower one
-    /// first. The first two of more; the only one is the first.
+    /// The two texture coordinate sets of a primitive's mesh, in ascending order: the first two that its
+    /// material's textures use. If they use only one set, that one comes first.
     pub(super) fn coordinate_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
         let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
@@ -140,18 +144,18 @@ impl Container {
         }
     }
 
-    /// The vertex of each corner as an index into the list of vertices that is returned too: all, or those that are used if
-    /// these are fewer than half.
-    fn corners(&self, primitive: &Primitive, vertices: usize) -> Result<(Vec<u32>, Vec<u32>), Wrong> {
+    /// Returns the vertex of each corner, as an index into the list of vertices that is also returned: all
+    /// vertices, or only the used ones if those are fewer than half.
+    fn corners(&self, primitive: &Primitive, vertices: usize) -> Result<(Vec<u32>, Vec<u32>), GltfError> {
         let all = || (0..vertices as u32).collect();
         let Some(number) = primitive.indices else { return Ok((all(), all())) };
-        let indices = Numbers::of(self, number).map_err(|wrong| wrong.inside("indices"))?;
+        let indices = AccessorReader::open(self, number).map_err(|wrong| wrong.inside("indices"))?;
         if !indices.are_indices() {
-            return Err(Wrong::new("its indices are not whole numbers").inside("indices"));
+            return Err(GltfError::new("indices must be integers").inside("indices"));
         }
         let mut corners: Vec<u32> = (0..indices.count).map(|place| indices.index(place)).collect();
-        if let Some(wrong) = corners.iter().find(|corner| **corner as usize >= vertices) {
-            return Err(Wrong::new(format!("vertex {wrong} is out of range: there are {vertices}, from 0")));
+        if let Some(vertex) = corners.iter().find(|corner| **corner as usize >= vertices) {
+            return Err(GltfError::new(vertex_out_of_range(i64::from(*vertex), vertices as u64)));
         }
         if corners.len() >= vertices / 2 {
             return Ok((corners, all()));
@@ -166,7 +170,11 @@ impl Container {
     }
 }
 
-/// The triangles of corners in a mode. Corners without a whole triangle are left out.
+pub(super) fn wrong_width(width: usize) -> String {
+    format!("expected VEC3, found {width} components")
+}
+
+/// Triangulates corners according to the mode. Incomplete triangles are dropped.
 fn faces(mode: u32, corners: &[u32]) -> Faces {
     let mut faces = Faces::default();
     let mut add = |triangle: [u32; 3]| {
@@ -175,9 +183,9 @@ fn faces(mode: u32, corners: &[u32]) -> Faces {
     };
     match mode {
         STRIP => {
-            for (place, window) in corners.windows(3).enumerate() {
+            for (index, window) in corners.windows(3).enumerate() {
                 let [a, b, c] = [window[0], window[1], window[2]];
-                add(if place % 2 == 0 { [a, b, c] } else { [b, a, c] });
+                add(if index % 2 == 0 { [a, b, c] } else { [b, a, c] });
             }
         }
         FAN => {

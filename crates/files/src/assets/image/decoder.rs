@@ -1,4 +1,4 @@
-//! The decoder of each format, and the limits that an image must keep before memory of its size is allocated.
+//! The decoder of each format, and limits that are checked before memory is allocated.
 
 use std::io::{BufRead, Seek, SeekFrom};
 
@@ -6,59 +6,60 @@ use ::image::metadata::Orientation;
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::exr::ExrDecoder;
-use super::facts::{Alpha, Facts};
 use super::hdr::HdrDecoder;
+use super::metadata::{AlphaUsage, ImageMetadata};
 use super::png::PngDecoder;
 use super::{ImageEncoding, ImageLimits, tga};
+use super::{empty_image, exceeds_memory, implausible_size, side_too_long};
 
-/// A decoder of an image, with the properties that it does not apply.
-pub(super) struct Opened {
+/// A decoder and the metadata that it does not apply.
+pub(super) struct OpenedImage {
     pub(super) decoder: Box<dyn ImageDecoder>,
-    pub(super) facts: Facts,
-    /// Bytes that the texels will take.
+    pub(super) metadata: ImageMetadata,
+    /// Size of the texels in bytes.
     pub(super) texel_bytes: u64,
 }
 
-/// The decoder of the format that was found.
+/// Creates the decoder of the detected format.
 pub(super) fn choose<R: BufRead + Seek + 'static>(
     mut reader: ImageReader<R>,
     encoding: ImageEncoding,
     memory_bytes: u64,
-) -> Result<(Box<dyn ImageDecoder>, Facts), ImageError> {
+) -> Result<(Box<dyn ImageDecoder>, ImageMetadata), ImageError> {
     match reader.format() {
         Some(ImageFormat::Png) => {
             let decoder = PngDecoder::new(reader.into_inner(), memory_bytes)?;
-            let facts = decoder.facts();
-            Ok((Box::new(decoder), facts))
+            let metadata = decoder.metadata();
+            Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::OpenExr) => {
             let decoder = ExrDecoder::new(reader.into_inner(), memory_bytes)?;
-            let facts = decoder.facts();
-            Ok((Box::new(decoder), facts))
+            let metadata = decoder.metadata();
+            Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::Hdr) => {
             let mut decoder = HdrDecoder::new(reader.into_inner())?;
-            let facts = decoder.facts();
-            Ok((Box::new(decoder), facts))
+            let metadata = decoder.metadata();
+            Ok((Box::new(decoder), metadata))
         }
         Some(ImageFormat::Tga) => {
             let (decoder, alpha) = tga::open(reader.into_inner())?;
-            Ok((Box::new(decoder), Facts { alpha, ..Facts::default() }))
+            Ok((Box::new(decoder), ImageMetadata { alpha, ..ImageMetadata::default() }))
         }
         format => {
-            let mut facts = Facts::default();
+            let mut metadata = ImageMetadata::default();
             if format == Some(ImageFormat::Bmp) {
-                facts.alpha = Alpha::Unsure;
+                metadata.alpha = AlphaUsage::UnusedIfZero;
             }
             if format == Some(ImageFormat::WebP) {
                 let mut file = reader.into_inner();
-                // The decoder reports what is wrong with the file.
+                // Errors are reported by the decoder below.
                 let frames = image_webp::WebPDecoder::new(&mut file).map_or(0, |webp| webp.num_frames());
                 file.seek(SeekFrom::Start(0))?;
-                facts.warn_of_frames(frames);
+                metadata.warn_of_frames(frames);
                 reader = ImageReader::with_format(file, ImageFormat::WebP);
             }
-            // Width and height are checked elsewhere, with better messages.
+            // Width and height are checked in `check_size`, with better messages.
             let mut limits = Limits::default();
             limits.max_alloc = Some(memory_bytes);
             reader.limits(limits);
@@ -66,86 +67,76 @@ pub(super) fn choose<R: BufRead + Seek + 'static>(
             if encoding.is_declared()
                 && let Some(profile) = decoder.icc_profile()?
             {
-                facts.add_profile(Some(&profile), !decoder.color_type().has_color());
+                metadata.add_profile(Some(&profile), !decoder.color_type().has_color());
             }
-            Ok((Box::new(decoder), facts))
+            Ok((Box::new(decoder), metadata))
         }
     }
 }
 
-/// The orientation of an image. Some programs begin its Exif data as in a JPEG, which `image` does not read elsewhere.
+/// Orientation of an image. In formats other than JPEG, `image` does not support Exif data with the prefix used
+/// in JPEG, which some programs write.
 pub(super) fn orientation(decoder: &mut dyn ImageDecoder) -> Result<Orientation, ImageError> {
-    let found = decoder.orientation()?;
-    let exif = if found == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
-    let bare = exif.as_ref().and_then(|exif| exif.strip_prefix(b"Exif\0\0"));
-    Ok(bare.and_then(Orientation::from_exif_chunk).unwrap_or(found))
+    let orientation = decoder.orientation()?;
+    let exif = if orientation == Orientation::NoTransforms { decoder.exif_metadata()? } else { None };
+    let without_prefix = exif.as_ref().and_then(|exif| exif.strip_prefix(b"Exif\0\0"));
+    Ok(without_prefix.and_then(Orientation::from_exif_chunk).unwrap_or(orientation))
 }
 
-/// Bytes of a texel, as [`convert::texels`] makes it.
-pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, facts: &Facts) -> u64 {
+/// Size of a texel produced by [`convert::texels`].
+pub(super) fn texel_bytes(color: ColorType, encoding: ImageEncoding, metadata: &ImageMetadata) -> u64 {
     let sample_bytes = color.bytes_per_pixel() / color.channel_count();
-    let is_packed = sample_bytes == 1 && encoding.space(facts).is_usual();
+    let is_packed = sample_bytes == 1 && encoding.space(metadata).is_default();
     match encoding {
         ImageEncoding::CutOut(_) if color.has_alpha() => {
-            if is_packed && facts.alpha != Alpha::Premultiplied {
-                4
-            } else {
-                16
-            }
+            if is_packed && metadata.alpha != AlphaUsage::Premultiplied { 4 } else { 16 }
         }
         _ if is_packed => 3,
         _ => 12,
     }
 }
 
-/// Bytes of memory that an image may take however short its file is.
+/// Memory that any image may take, however short its file is.
 const SMALL_BYTES: u64 = 256 << 20;
-/// Bytes of memory that a byte of a file may become, by how the format packs: the image as it is decoded, and its texels.
-pub(super) fn most_growth(format: Option<ImageFormat>) -> u64 {
+/// Maximum ratio of memory to file size for each format, counting the decoded image and its texels.
+pub(super) fn max_expansion(format: Option<ImageFormat>) -> u64 {
     match format {
-        // Eight pixels of a bitmap.
+        // Eight pixels per byte in a bitmap.
         Some(ImageFormat::Pnm) => 64,
         // Runs of 128 pixels in two bytes.
         Some(ImageFormat::Tga) => 512,
         // Runs of 255 pixels in two bytes.
         Some(ImageFormat::Bmp) => 1024,
-        // An EXR of one colour, which deflate packs best.
+        // A single-color EXR, which deflate compresses best.
         _ => 4200,
     }
 }
 
-/// Refuses an image before memory of its size is allocated; returns the bytes of the texels. Bytes of the file that the
-/// decoder holds count too; those in memory beside it make way for the texels.
+/// Checks an image's size before memory is allocated, and returns the size of its texels. `held_bytes` is the
+/// part of the file that the decoder holds. The file in memory (`in_memory`) is freed before the texels are
+/// complete.
 pub(super) fn check_size(
     decoder: &dyn ImageDecoder,
     texel_bytes: u64,
     [length, held_bytes, in_memory]: [u64; 3],
     limits: ImageLimits,
-    most_growth: u64,
+    max_expansion: u64,
 ) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
-    let size = format!("it has {width} × {height} pixels");
     if width == 0 || height == 0 {
-        return Err(size);
+        return Err(empty_image(width, height));
     }
     if width.max(height) > limits.side {
-        return Err(format!("{size}, more than {} a side", limits.side));
+        return Err(side_too_long(width, height, limits.side));
     }
     let texels = u64::from(width) * u64::from(height) * texel_bytes;
     let needed = decoder.total_bytes().saturating_add(texels.max(in_memory)).saturating_add(held_bytes);
     if needed > limits.memory_bytes {
-        let (needed, most) = (needed.div_ceil(1 << 20), limits.memory_bytes >> 20);
-        return Err(format!(
-            "{size}, which take {needed} MiB of memory, more than the {most} MiB that one image may take"
-        ));
+        return Err(exceeds_memory(width, height, needed, limits.memory_bytes));
     }
-    // Runs may leave out most of an image, so that a few bytes are a whole one.
-    if needed > SMALL_BYTES.saturating_add(length.saturating_mul(most_growth)) {
-        let needed = needed.div_ceil(1 << 20);
-        return Err(format!(
-            "it claims {width} × {height} pixels, which take {needed} MiB of memory, more than a file of {length} bytes \
-             stands for"
-        ));
+    // A few bytes of runs can expand to a large image.
+    if needed > SMALL_BYTES.saturating_add(length.saturating_mul(max_expansion)) {
+        return Err(implausible_size(width, height, needed, length));
     }
     Ok(texels)
 }

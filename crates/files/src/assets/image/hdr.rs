@@ -1,42 +1,47 @@
-//! Radiance HDR (Ward, *Real Pixels*, Graphics Gems II, 1991). `image` reads one of its eight orientations and none of the lines
-//! that scale its values.
+//! Radiance HDR decoder (Ward, *Real Pixels*, Graphics Gems II, 1991). `image` supports only one of the eight
+//! orientations and ignores header lines that scale the values.
 
 use std::io::{self, BufRead, Read};
 
 use ::image::error::{DecodingError, ImageFormatHint};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::facts::{Facts, Ignored};
+use super::metadata::{ImageMetadata, ImageWarning};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
 
-/// Most bytes of a header with the line of the size; the same limit as for PLY.
+/// Maximum size of a header, including the line with the resolution. PLY has the same limit.
 const HEADER_BYTES: u64 = 1 << 20;
-/// Lumens per watt of white light, by which the values of XYZE files are larger (`WHTEFFICACY` of Radiance).
+/// Luminous efficacy of white light in lm/W, by which XYZE files scale their values (`WHTEFFICACY` in
+/// Radiance).
 const WHITE_EFFICACY: f64 = 179.0;
-/// First bytes of a file; the name of a program follows.
+/// First bytes of a file, followed by a program's name.
 pub(super) const MAGIC: &[u8] = b"#?";
 
 /// Decoder of an HDR file.
 pub(super) struct HdrDecoder<R> {
     file: R,
-    header: Header,
+    header: HdrHeader,
 }
 
 impl<R: BufRead> HdrDecoder<R> {
     pub(super) fn new(mut file: R) -> ImageResult<Self> {
         let mut limited = (&mut file).take(HEADER_BYTES);
-        let header = Header::read(&mut limited);
+        let header = HdrHeader::read(&mut limited);
         if limited.limit() == 0 {
-            return Err(error(format!("its header does not end within {} MiB", HEADER_BYTES >> 20)));
+            return Err(error(header_too_long()));
         }
         Ok(Self { header: header?, file })
     }
 
-    /// The facts that the samples do not contain.
-    pub(super) fn facts(&mut self) -> Facts {
+    /// Color space and warnings.
+    pub(super) fn metadata(&mut self) -> ImageMetadata {
         let space = std::mem::take(&mut self.header.space);
-        Facts { space, ignored: std::mem::take(&mut self.header.ignored), ..Facts::default() }
+        ImageMetadata {
+            space,
+            warnings: std::mem::take(&mut self.header.warnings),
+            ..ImageMetadata::default()
+        }
     }
 }
 
@@ -51,7 +56,7 @@ impl<R: BufRead> ImageDecoder for HdrDecoder<R> {
 
     fn read_image(self, samples: &mut [u8]) -> ImageResult<()> {
         const PIXEL_BYTES: usize = 12;
-        let Self { mut file, header: Header { scan, scales, .. } } = self;
+        let Self { mut file, header: HdrHeader { scan, scales, .. } } = self;
         let mut pixels = Vec::new();
         for line in 0..scan.slow.count {
             read_line(&mut file, scan.fast.count as usize, &mut pixels)?;
@@ -69,45 +74,45 @@ impl<R: BufRead> ImageDecoder for HdrDecoder<R> {
     }
 }
 
-struct Header {
-    scan: Scan,
-    /// Factors on red, green and blue.
+struct HdrHeader {
+    scan: ScanOrder,
+    /// Factors for red, green and blue.
     scales: [f64; 3],
     space: ColorSpace,
-    ignored: Vec<Ignored>,
+    warnings: Vec<ImageWarning>,
 }
 
-impl Header {
+impl HdrHeader {
     fn read(file: &mut impl BufRead) -> ImageResult<Self> {
-        let mut lines = Lines { file, number: 0, line: Vec::new() };
+        let mut lines = HeaderLines { file, number: 0, line: Vec::new() };
         let first = lines.next()?;
         if !first.as_bytes().starts_with(MAGIC) {
-            return Err(error("it does not begin with #?".to_owned()));
+            return Err(error("expected #? at the start".to_owned()));
         }
-        let mut statements = Statements::default();
+        let mut variables = HeaderVariables::default();
         let scan = loop {
             let number = lines.number + 1;
             let line = lines.next()?;
-            // The size follows an empty line, which some programs leave out.
-            if let Some(scan) = Scan::parse(&line) {
+            // The resolution follows an empty line, which some programs omit.
+            if let Some(scan) = ScanOrder::parse(&line) {
                 break scan;
             }
             if !line.trim().is_empty() {
-                statements.add(&line, number).map_err(error)?;
+                variables.add(&line, number).map_err(error)?;
             }
         };
-        Ok(statements.header(scan))
+        Ok(variables.header(scan))
     }
 }
 
-/// Lines of a header, with any line end.
-struct Lines<'a, R> {
+/// Lines of a header with any line ending.
+struct HeaderLines<'a, R> {
     file: &'a mut R,
     number: usize,
     line: Vec<u8>,
 }
 
-impl<R: BufRead> Lines<'_, R> {
+impl<R: BufRead> HeaderLines<'_, R> {
     fn next(&mut self) -> ImageResult<String> {
         self.line.clear();
         let got = self.file.read_until(b'\n', &mut self.line).map_err(ImageError::IoError)?;
@@ -120,19 +125,19 @@ impl<R: BufRead> Lines<'_, R> {
     }
 }
 
-/// Lines of the header that change values.
+/// Header variables that affect the values.
 #[derive(Default)]
-struct Statements {
-    /// Product of all `EXPOSURE` lines, and of all `COLORCORR` lines.
+struct HeaderVariables {
+    /// Products of all `EXPOSURE` lines and of all `COLORCORR` lines.
     exposure: Option<f64>,
     correction: Option<[f64; 3]>,
     primaries: Option<Primaries>,
     is_xyz: bool,
-    ignored: Vec<Ignored>,
+    warnings: Vec<ImageWarning>,
 }
 
-impl Statements {
-    /// Adds a line. Indented ones are quoted from other headers.
+impl HeaderVariables {
+    /// Adds a line. Indented lines are quoted from other headers.
     fn add(&mut self, line: &str, number: usize) -> Result<(), String> {
         let Some((name, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) else {
             return Ok(());
@@ -145,18 +150,16 @@ impl Statements {
                     true
                 }
                 other => {
-                    return Err(format!(
-                        "its format {other:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze"
-                    ));
+                    return Err(unsupported_encoding(other));
                 }
             },
-            "EXPOSURE" => numbers(value).filter(positive).is_some_and(|[by]: [f64; 1]| {
-                self.exposure = Some(self.exposure.unwrap_or(1.0) * by);
+            "EXPOSURE" => numbers(value).filter(positive).is_some_and(|[factor]: [f64; 1]| {
+                self.exposure = Some(self.exposure.unwrap_or(1.0) * factor);
                 true
             }),
-            "COLORCORR" => numbers(value).filter(positive).is_some_and(|by: [f64; 3]| {
-                let before = self.correction.unwrap_or([1.0; 3]);
-                self.correction = Some(std::array::from_fn(|i| before[i] * by[i]));
+            "COLORCORR" => numbers(value).filter(positive).is_some_and(|factors: [f64; 3]| {
+                let previous = self.correction.unwrap_or([1.0; 3]);
+                self.correction = Some(std::array::from_fn(|i| previous[i] * factors[i]));
                 true
             }),
             "PRIMARIES" => {
@@ -169,48 +172,63 @@ impl Statements {
         };
         if !is_known {
             let line: String = line.chars().take(60).collect();
-            let words = format!("`{line}` is ignored");
-            self.ignored.push(Ignored { line: Some(number), words });
+            self.warnings.push(ImageWarning { line: Some(number), words: line_ignored(&line) });
         }
         Ok(())
     }
 
-    fn header(self, scan: Scan) -> Header {
+    fn header(self, scan: ScanOrder) -> HdrHeader {
         let correction = self.correction.unwrap_or([1.0; 3]);
         let unit = if self.is_xyz { WHITE_EFFICACY } else { 1.0 };
         let exposure = self.exposure.unwrap_or(1.0) * unit;
         let primaries = if self.is_xyz { Some(Primaries::XYZ) } else { self.primaries };
         let matrix = primaries.and_then(Primaries::to_rec_709);
-        Header {
+        HdrHeader {
             scan,
             scales: correction.map(|correction| 1.0 / (exposure * correction)),
             space: matrix.map_or_else(ColorSpace::default, ColorSpace::of_matrix),
-            ignored: self.ignored,
+            warnings: self.warnings,
         }
     }
 }
 
-/// The numbers of a line, `N` of them.
+pub(super) fn header_too_long() -> String {
+    format!("the header is longer than {} MiB", HEADER_BYTES >> 20)
+}
+
+pub(super) fn unsupported_encoding(found: &str) -> String {
+    format!("format {found:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze")
+}
+
+/// Warning about a header line.
+pub(super) fn line_ignored(line: &str) -> String {
+    format!("`{line}` is ignored")
+}
+
+pub(super) const WRONG_LENGTH: &str = "a scanline's length differs from the header";
+pub(super) const RUN_TOO_LONG: &str = "a run exceeds its scanline";
+
+/// Parses exactly `N` numbers.
 fn numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
     let numbers: Option<Vec<f64>> = value.split_whitespace().map(|word| word.parse().ok()).collect();
     numbers?.try_into().ok()
 }
 
-/// Whether all numbers are finite and above 0.
+/// Whether all numbers are finite and positive.
 fn positive<const N: usize>(numbers: &[f64; N]) -> bool {
     numbers.iter().all(|number| number.is_finite() && *number > 0.0)
 }
 
-/// An axis of the image, in the order of the file.
+/// An axis of the pixel order.
 #[derive(Clone, Copy)]
-struct Axis {
+struct ScanAxis {
     is_vertical: bool,
-    /// Whether pixels run to the right, or down.
+    /// Whether pixels run to the right or downwards.
     is_forward: bool,
     count: u32,
 }
 
-impl Axis {
+impl ScanAxis {
     fn parse(name: &str, count: &str) -> Option<Self> {
         let (is_vertical, is_forward) = match name {
             "-Y" => (true, true),
@@ -222,52 +240,52 @@ impl Axis {
         Some(Self { is_vertical, is_forward, count: count.parse().ok()? })
     }
 
-    /// Column or row of a position along the axis.
-    fn place(self, at: usize) -> usize {
+    /// Column or row at a position along the axis.
+    fn coordinate(self, at: usize) -> usize {
         if self.is_forward { at } else { self.count as usize - 1 - at }
     }
 }
 
 /// Order of the pixels in the file.
-struct Scan {
-    slow: Axis,
-    fast: Axis,
+struct ScanOrder {
+    slow: ScanAxis,
+    fast: ScanAxis,
 }
 
-impl Scan {
+impl ScanOrder {
     fn parse(line: &str) -> Option<Self> {
         let words: Vec<_> = line.split_whitespace().collect();
         let [first, slow, second, fast] = words.as_slice() else { return None };
-        let scan = Self { slow: Axis::parse(first, slow)?, fast: Axis::parse(second, fast)? };
+        let scan = Self { slow: ScanAxis::parse(first, slow)?, fast: ScanAxis::parse(second, fast)? };
         (scan.slow.is_vertical != scan.fast.is_vertical).then_some(scan)
     }
 
-    /// Columns and rows.
+    /// Width and height.
     fn size(&self) -> (u32, u32) {
         let (slow, fast) = (self.slow.count, self.fast.count);
         if self.slow.is_vertical { (fast, slow) } else { (slow, fast) }
     }
 
-    /// Index of a pixel in rows from the top.
+    /// Index of a pixel in row-major order from the top left.
     fn index(&self, line: usize, along: usize) -> usize {
-        let (slow, fast) = (self.slow.place(line), self.fast.place(along));
+        let (slow, fast) = (self.slow.coordinate(line), self.fast.coordinate(along));
         let (column, row) = if self.slow.is_vertical { (fast, slow) } else { (slow, fast) };
         row * self.size().0 as usize + column
     }
 }
 
-/// Linear values of red, green, blue and a shared exponent.
+/// Decodes red, green and blue with a shared exponent.
 fn radiance([red, green, blue, exponent]: [u8; 4], scales: [f64; 3]) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];
     }
-    // 2^(exponent − 136), by its bits.
+    // 2^(exponent − 136), constructed from its bits.
     let unit = f64::from_bits((1023 - 136 + u64::from(exponent)) << 52);
     let [r, g, b] = [red, green, blue].map(f64::from);
     [r * unit * scales[0], g * unit * scales[1], b * unit * scales[2]].map(|value| value as f32)
 }
 
-/// Reads a line of `count` pixels.
+/// Reads a scanline of `count` pixels.
 fn read_line(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) -> ImageResult<()> {
     const RUNS: std::ops::RangeInclusive<usize> = 8..=0x7fff;
     pixels.clear();
@@ -277,20 +295,20 @@ fn read_line(file: &mut impl Read, count: usize, pixels: &mut Vec<[u8; 4]>) -> I
         return read_flat(file, first, count, pixels);
     }
     if usize::from(u16::from_be_bytes([high, low])) != count {
-        return Err(error("a line of it has another length than the header says".to_owned()));
+        return Err(error(WRONG_LENGTH.to_owned()));
     }
     pixels.resize(count, [0; 4]);
     (0..4).try_for_each(|channel| read_runs(file, channel, pixels))
 }
 
-/// Reads one channel of a line, in runs.
+/// Reads one run-length encoded channel of a scanline.
 fn read_runs(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> ImageResult<()> {
     let mut done = 0;
     while done < pixels.len() {
         let [code] = read_bytes(file)?;
         let length = usize::from(if code > 128 { code - 128 } else { code });
         let run = pixels.get_mut(done..done + length).filter(|run| !run.is_empty());
-        let Some(run) = run else { return Err(error("a run of it does not fit into its line".to_owned())) };
+        let Some(run) = run else { return Err(error(RUN_TOO_LONG.to_owned())) };
         if code > 128 {
             let [value] = read_bytes(file)?;
             run.iter_mut().for_each(|pixel| pixel[channel] = value);
@@ -304,7 +322,7 @@ fn read_runs(file: &mut impl Read, channel: usize, pixels: &mut [[u8; 4]]) -> Im
     Ok(())
 }
 
-/// Reads a line of whole pixels, of which (1, 1, 1, n) repeats the previous one.
+/// Reads a scanline of whole pixels, where (1, 1, 1, n) repeats the previous pixel.
 fn read_flat(
     file: &mut impl Read,
     first: [u8; 4],
@@ -325,7 +343,7 @@ fn read_flat(
         let length = usize::from(times).checked_shl(shift).unwrap_or(usize::MAX);
         let previous = pixels.last().copied().filter(|_| length <= count - pixels.len());
         let Some(previous) = previous else {
-            return Err(error("a run of it does not fit into its line".to_owned()));
+            return Err(error(RUN_TOO_LONG.to_owned()));
         };
         pixels.resize(pixels.len() + length, previous);
         shift += 8;

@@ -1,34 +1,45 @@
-//! Color profiles of a matrix and curves, or of one gray curve (ICC.1:2022). Profiles of tables are not read.
+//! ICC profiles with a matrix and curves, or with a single gray curve (ICC.1:2022). Profiles with lookup
+//! tables are not supported.
 
 use super::primaries::from_colorants;
 use super::space::{ColorSpace, Curve};
 use crate::math::{DMat3, DVec3};
 
-/// Most values of a curve's table.
-const MOST_VALUES: usize = 1 << 16;
+/// Maximum length of a curve's table.
+const MAX_VALUES: usize = 1 << 16;
 
-/// The color space of a profile for an image of this kind, or the reason why it is ignored.
+/// Returns the color space of a profile for a gray or RGB image, or the reason why the profile is ignored.
 pub(super) fn space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
-    let profile = Profile::of(profile).ok_or("it is broken")?;
+    let profile = IccProfile::parse(profile).ok_or(MALFORMED)?;
     match (profile.field(16), profile.field(20)) {
         (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb(),
         (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
-            let curve = profile.curve(b"kTRC").ok_or("it has no gray curve that can be read")?;
+            let curve = profile.curve(b"kTRC").ok_or(UNSUPPORTED_CURVES)?;
             Ok(ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), DMat3::IDENTITY))
         }
-        (Some(b"RGB "), Some(b"Lab ")) if !is_gray => Err("it has tables instead of a matrix".to_owned()),
+        (Some(b"RGB "), Some(b"Lab ")) if !is_gray => Err(LOOKUP_TABLES.to_owned()),
         (Some(space), _) => {
             let space = String::from_utf8_lossy(space).trim().to_owned();
-            Err(format!("it is for {space:?}, not for {}", if is_gray { "gray" } else { "RGB" }))
+            Err(wrong_space(&space, is_gray))
         }
-        (None, _) => Err("it is broken".to_owned()),
+        (None, _) => Err(MALFORMED.to_owned()),
     }
 }
 
-struct Profile<'a>(&'a [u8]);
+pub(super) const MALFORMED: &str = "malformed profile";
+pub(super) const LOOKUP_TABLES: &str = "lookup tables are not supported";
+pub(super) const UNSUPPORTED_CURVES: &str = "missing or unsupported curves";
+pub(super) const DEGENERATE_PRIMARIES: &str = "degenerate primaries";
 
-impl<'a> Profile<'a> {
-    fn of(bytes: &'a [u8]) -> Option<Self> {
+/// Reason to ignore a profile for another color space.
+pub(super) fn wrong_space(found: &str, is_gray: bool) -> String {
+    format!("its color space is {found:?}, not {}", if is_gray { "gray" } else { "RGB" })
+}
+
+struct IccProfile<'a>(&'a [u8]);
+
+impl<'a> IccProfile<'a> {
+    fn parse(bytes: &'a [u8]) -> Option<Self> {
         let profile = Self(bytes);
         (profile.field(36)? == b"acsp").then_some(profile)
     }
@@ -41,7 +52,7 @@ impl<'a> Profile<'a> {
         self.field(at).map(|bytes| u32::from_be_bytes(*bytes) as usize)
     }
 
-    /// The data of a tag.
+    /// Data of a tag.
     fn tag(&self, name: &[u8; 4]) -> Option<&'a [u8]> {
         const TABLE: usize = 128;
         let count = self.word(TABLE)?.min(self.0.len() / 12);
@@ -53,17 +64,17 @@ impl<'a> Profile<'a> {
     fn rgb(&self) -> Result<ColorSpace, String> {
         let [red, green, blue] = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|name| self.xyz(name));
         let (Some(red), Some(green), Some(blue)) = (red, green, blue) else {
-            return Err("it has tables instead of a matrix".to_owned());
+            return Err(LOOKUP_TABLES.to_owned());
         };
         let curves = [b"rTRC", b"gTRC", b"bTRC"].map(|name| self.curve(name));
         let [Some(r), Some(g), Some(b)] = curves else {
-            return Err("it has no curves that can be read".to_owned());
+            return Err(UNSUPPORTED_CURVES.to_owned());
         };
         let colorants = DMat3::from_cols(red, green, blue);
         if colorants.determinant().abs() < 1e-6 {
-            return Err("its primaries span no colors".to_owned());
+            return Err(DEGENERATE_PRIMARIES.to_owned());
         }
-        let matrix = from_colorants(colorants).ok_or("its primaries span no colors")?;
+        let matrix = from_colorants(colorants).ok_or(DEGENERATE_PRIMARIES)?;
         Ok(ColorSpace::new(Some([r, g, b]), matrix))
     }
 
@@ -74,7 +85,7 @@ impl<'a> Profile<'a> {
         Some(DVec3::new(x?, y?, z?))
     }
 
-    /// A number of the type s15Fixed16.
+    /// A number of type s15Fixed16.
     fn fixed(&self, at: usize) -> Option<f64> {
         self.field(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
     }
@@ -91,7 +102,7 @@ impl<'a> Profile<'a> {
     fn sampled(&self) -> Option<Curve> {
         const START: usize = 12;
         let count = self.word(8)?;
-        let values = self.0.get(START..START + 2 * count.min(MOST_VALUES))?;
+        let values = self.0.get(START..START + 2 * count.min(MAX_VALUES))?;
         let values: Vec<u16> = values.as_chunks().0.iter().map(|word| u16::from_be_bytes(*word)).collect();
         match *values.as_slice() {
             [] => Some(Curve::LINEAR),

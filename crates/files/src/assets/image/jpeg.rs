@@ -1,31 +1,35 @@
-//! Faults that the JPEG decoder accepts and a texture must not have: it fills missing data with grey.
+//! Rejects malformed JPEG files that the decoder accepts, filling missing data with gray.
 
 use std::path::Path;
 
 use crate::assets::AssetError;
-use crate::assets::read::{self, Watch};
+use crate::assets::read::{self, Monitor};
 use crate::control::{CancelToken, ignore_progress};
 
-/// Checks that the last scan ends: the marker of the end of the image follows that of the scan's start. Within a scan
-/// neither can occur (ITU-T T.81, B.1.1.5).
-pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
-    let bytes = read::bytes(path, limit, Watch { progress: &ignore_progress, token });
+/// Checks that the end-of-image marker follows the last start-of-scan marker. Neither can occur within a scan
+/// (ITU-T T.81, B.1.1.5).
+pub(super) fn check_complete(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
+    let bytes = read::bytes(path, limit, Monitor { progress: &ignore_progress, token });
     check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
 }
 
-/// Checks bytes in memory: the kind of the file, and as [`check_whole`].
+/// Checks the kind of JPEG, and [`check_complete`], for bytes in memory.
 pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
     check_kind(bytes)?;
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     match (last([0xff, 0xda]), last([0xff, 0xd9])) {
         (Some(scan), Some(end)) if scan < end => Ok(()),
-        _ => Err("the file ends before the image does".to_owned()),
+        _ => Err(TRUNCATED.to_owned()),
     }
 }
 
-/// Refuses kinds that the decoder does not name as such (ITU-T T.81, table B.1).
+/// Reason to reject a file that ends within the image.
+pub(super) const TRUNCATED: &str = "the image data is truncated";
+
+/// Rejects kinds of JPEG that the decoder does not support, because its own message does not name them (ITU-T
+/// T.81, table B.1).
 fn check_kind(bytes: &[u8]) -> Result<(), String> {
-    // The data of a frame begins with the bits of a sample.
+    // A frame header starts with the bits per sample.
     let mut frames = segments(bytes)
         .filter(|(marker, _)| matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc));
     let Some((marker, start)) = frames.next() else { return Ok(()) };
@@ -33,13 +37,14 @@ fn check_kind(bytes: &[u8]) -> Result<(), String> {
         (0xc9..=0xcf, _) => "an arithmetic-coded JPEG".to_owned(),
         (0xc3, _) => "a lossless JPEG".to_owned(),
         (0xc5..=0xc7, _) => "a hierarchical JPEG".to_owned(),
-        (_, Some(bits)) if *bits != 8 => format!("a JPEG of {bits} bits"),
+        (_, Some(bits)) if *bits != 8 => format!("a {bits}-bit JPEG"),
         (_, _) => return Ok(()),
     };
     Err(format!("it is {kind}; save it as a baseline or progressive JPEG, or as PNG"))
 }
 
-/// Place of the byte by which an Adobe segment says RGB, although a JFIF segment says YCbCr. Readers follow the latter.
+/// Offset of the transform byte of an Adobe segment that claims RGB although a JFIF segment claims YCbCr. Readers
+/// follow the JFIF segment.
 pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
     const ADOBE: &[u8] = b"Adobe";
     const TRANSFORM: usize = 11;
@@ -53,19 +58,19 @@ pub(super) fn misleading_transform(bytes: &[u8]) -> Option<usize> {
     (bytes.get(transform) == Some(&0)).then_some(transform)
 }
 
-/// Makes the Adobe segment say YCbCr if the JFIF segment does.
+/// Sets a misleading Adobe segment to YCbCr.
 pub(super) fn correct_transform(bytes: &mut [u8]) {
     if let Some(transform) = misleading_transform(bytes) {
         bytes[transform] = 1;
     }
 }
 
-/// The segments before the first scan: marker, and the place of its data.
+/// Markers and data offsets of the segments before the first scan.
 fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     const SCAN: u8 = 0xda;
     let mut at = 2;
     std::iter::from_fn(move || {
-        // A marker may follow any number of bytes 0xff.
+        // Any number of fill bytes 0xff may precede a marker.
         while bytes.get(at..at + 2)? == [0xff, 0xff] {
             at += 1;
         }
@@ -76,13 +81,18 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = (u8, usize)> {
     })
 }
 
-/// Checks the size: each block of 8 × 8 pixels takes at least one bit, that of its mean.
+/// Checks the size in the header: each block of 8 × 8 pixels takes at least one bit, for its mean.
 pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
     let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
     if blocks > file_bytes.saturating_mul(8) {
-        return Err(format!("it claims {width} × {height} pixels, which {file_bytes} bytes cannot hold"));
+        return Err(too_many_pixels(width, height, file_bytes));
     }
     Ok(())
+}
+
+/// Reason to reject an image with more pixels than its file can hold.
+pub(super) fn too_many_pixels(width: u32, height: u32, file_bytes: u64) -> String {
+    format!("the header claims {width} × {height} pixels, too many for a file of {file_bytes} bytes")
 }
 
 #[cfg(test)]
@@ -90,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn unread_kinds_are_named() {
+    fn unsupported_kinds_are_rejected() {
         let file = |marker: u8, bits: u8| {
             [
                 0xff, 0xd8, 0xff, 0xe0, 0, 4, 1, 2, 0xff, 0xff, marker, 0, 5, bits, 0, 0, 0xff, 0xda, 0, 2,
@@ -100,12 +110,12 @@ mod tests {
         for (marker, bits) in [(0xc0, 8), (0xc1, 8), (0xc2, 8)] {
             assert_eq!(check_bytes(&file(marker, bits)), Ok(()), "{marker:x}");
         }
-        // Huffman tables are not a frame.
+        // A Huffman table is not a frame.
         assert_eq!(check_bytes(&file(0xc4, 1)), Ok(()));
-        let said = |marker, bits| check_bytes(&file(marker, bits)).expect_err("refused");
-        let kinds = [0xc3, 0xc6, 0xc9, 0xca].map(|marker| said(marker, 8));
+        let error = |marker, bits| check_bytes(&file(marker, bits)).expect_err("an error");
+        let kinds = [0xc3, 0xc6, 0xc9, 0xca].map(|marker| error(marker, 8));
         assert!(kinds[0] != kinds[1] && kinds[1] != kinds[2] && kinds[2] == kinds[3], "{kinds:?}");
-        assert!(said(0xc1, 12).contains("12"));
+        assert!(error(0xc1, 12).contains("12"));
         let whole = file(0xc0, 8);
         for length in 0..whole.len() {
             assert!(check_bytes(&whole[..length]).is_err(), "{length}");
@@ -113,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn jfif_comes_before_an_adobe_transform() {
+    fn jfif_overrides_an_adobe_transform() {
         let file = |segments: &[&[u8]]| {
             let mut file = vec![0xff, 0xd8];
             for segment in segments {

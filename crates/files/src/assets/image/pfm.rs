@@ -1,19 +1,20 @@
-//! PFM, floats behind a header of three words (Debevec, *PFM Portable FloatMap Image Format*), which `image` leaves out.
+//! PFM decoder (Debevec, *PFM Portable FloatMap Image Format*), which `image` does not include.
 
 use std::io::{BufRead, Read};
 
 use ::image::error::{DecodingError, ImageFormatHint};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-/// Most bytes of the header.
+/// Maximum size of the header.
 const HEADER_BYTES: u64 = 1 << 10;
 
-/// Whether a file begins like a PFM.
+/// Whether a file starts like a PFM file.
 pub(super) fn is_pfm(start: &[u8]) -> bool {
     matches!(start, [b'P', b'F' | b'f', blank, ..] if blank.is_ascii_whitespace())
 }
 
-/// Decoder of a PFM file, whose rows begin at the bottom. The scale is a factor; below 0, the bytes are little-endian.
+/// Decoder of a PFM file, whose rows are stored from the bottom. Values are multiplied by the absolute value of the
+/// scale; a negative scale means little-endian.
 pub(super) struct PfmDecoder<R> {
     file: R,
     size: [u32; 2],
@@ -27,14 +28,14 @@ impl<R: BufRead> PfmDecoder<R> {
         let kind = word(&mut header)?;
         let mut side = |name: &str| {
             let word = word(&mut header)?;
-            word.parse().map_err(|_| error(format!("its {name} is {word:?}")))
+            word.parse().map_err(|_| error(format!("invalid {name} {word:?}")))
         };
         let size = [side("width")?, side("height")?];
         let scale = word(&mut header)?;
         let number: Option<f32> = fast_float2::parse(&scale).ok();
         match number.filter(|number| number.is_finite() && *number != 0.0) {
             Some(scale) => Ok(Self { file, size, is_gray: kind == "Pf", scale }),
-            None => Err(error(format!("its scale is {scale:?}, not a number above or below 0"))),
+            None => Err(error(format!("invalid scale {scale:?}; expected a nonzero number"))),
         }
     }
 }
@@ -52,14 +53,14 @@ impl<R: BufRead> ImageDecoder for PfmDecoder<R> {
         const FLOAT: usize = 4;
         let [width, _] = self.size.map(|side| side as usize);
         let copies = if self.is_gray { 3 } else { 1 };
-        let mut line = vec![0; width * FLOAT * 3 / copies];
+        let mut row_bytes = vec![0; width * FLOAT * 3 / copies];
         for row in samples.chunks_exact_mut(width * FLOAT * 3).rev() {
-            self.file.read_exact(&mut line)?;
-            let places = row.as_chunks_mut::<FLOAT>().0.chunks_exact_mut(copies);
-            for (place, bytes) in places.zip(line.as_chunks::<FLOAT>().0) {
+            self.file.read_exact(&mut row_bytes)?;
+            let targets = row.as_chunks_mut::<FLOAT>().0.chunks_exact_mut(copies);
+            for (target, bytes) in targets.zip(row_bytes.as_chunks::<FLOAT>().0) {
                 let value =
                     if self.scale < 0.0 { f32::from_le_bytes(*bytes) } else { f32::from_be_bytes(*bytes) };
-                place.fill((value * self.scale.abs()).to_ne_bytes());
+                target.fill((value * self.scale.abs()).to_ne_bytes());
             }
         }
         Ok(())
@@ -70,15 +71,15 @@ impl<R: BufRead> ImageDecoder for PfmDecoder<R> {
     }
 }
 
-/// Reads a word and the blank that ends it.
+/// Reads a word and the whitespace character after it.
 fn word(file: &mut impl Read) -> ImageResult<String> {
     let mut word = String::new();
     loop {
         let mut byte = [0];
         file.read_exact(&mut byte)?;
         match byte[0] {
-            blank if blank.is_ascii_whitespace() && word.is_empty() => {}
-            blank if blank.is_ascii_whitespace() => return Ok(word),
+            byte if byte.is_ascii_whitespace() && word.is_empty() => {}
+            byte if byte.is_ascii_whitespace() => return Ok(word),
             byte => word.push(char::from(byte)),
         }
     }

@@ -1,11 +1,11 @@
-//! PNG by `png`: `image` would unpack chunks beside the picture too.
+//! PNG decoder based on `png`. `image` would also decompress ancillary chunks.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::facts::Facts;
+use super::metadata::ImageMetadata;
 use super::primaries::Primaries;
 use super::space::{ColorSpace, Curve};
 use crate::assets::FileHash;
@@ -14,14 +14,14 @@ use crate::math::DMat3;
 
 const SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
-/// Most bytes of a color profile, packed and unpacked.
+/// Maximum size of a color profile, compressed and decompressed.
 const PROFILE_BYTES: u32 = 16 << 20;
 
-/// Bytes of a chunk that is skipped between two polls of the token.
+/// Bytes of a skipped chunk between two polls of the cancel token.
 const SKIPPED_BYTES: usize = 1 << 16;
 
-/// Reads a PNG without its text chunks, and hashes all of it: text of any length takes no memory. `None` if the file is not a PNG; it
-/// is then at its start again.
+/// Reads a PNG without its text chunks, but hashes all of it. Text chunks of any length take no memory.
+/// Returns `None` and rewinds the file if it is not a PNG.
 pub(super) fn without_text(
     mut file: impl Read + Seek,
     token: &CancelToken,
@@ -65,25 +65,25 @@ pub(super) fn without_text(
     }
 }
 
-/// Decoder of the first frame, without texts.
+/// Decoder of the first frame. Ignores text chunks.
 pub(super) struct PngDecoder<R: BufRead + Seek> {
     reader: png::Reader<R>,
     color_type: ColorType,
-    profile: Option<Profile>,
+    profile: Option<ProfileChunk>,
 }
 
-/// A color profile, or `None` if it cannot be unpacked.
-type Profile = Option<Vec<u8>>;
+/// A color profile, or `None` if it cannot be decompressed.
+type ProfileChunk = Option<Vec<u8>>;
 
 impl<R: BufRead + Seek> PngDecoder<R> {
-    /// A decoder that takes at most so many bytes of memory besides the pixels.
+    /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
         let profile = profile(&mut file).map_err(ImageError::IoError)?;
         let limits = png::Limits { bytes: usize::try_from(memory_bytes).unwrap_or(usize::MAX) };
         let mut decoder = png::Decoder::new_with_limits(file, limits);
         decoder.set_ignore_text_chunk(true);
         decoder.set_ignore_iccp_chunk(true);
-        // Palettes become colours, small numbers bytes; 16 bits stay.
+        // Expand palettes to colors and small integers to bytes. Keep 16 bits.
         decoder.set_transformations(png::Transformations::EXPAND);
         let reader = decoder.read_info().map_err(image_error)?;
         let (color_type, depth) = reader.output_color_type();
@@ -101,28 +101,28 @@ impl<R: BufRead + Seek> PngDecoder<R> {
         Ok(Self { reader, color_type, profile })
     }
 
-    /// The facts that the samples do not contain. Of several statements about colors, the first of `cICP`, `sRGB`, `iCCP`, and `gAMA`
+    /// Color space and warnings. Of several color chunks, the first of `cICP`, `sRGB`, `iCCP`, and `gAMA`
     /// with `cHRM` counts.
-    pub(super) fn facts(&self) -> Facts {
-        let (info, mut facts) = (self.reader.info(), Facts::default());
-        facts.warn_of_frames(info.animation_control().map_or(0, |control| control.num_frames));
+    pub(super) fn metadata(&self) -> ImageMetadata {
+        let (info, mut metadata) = (self.reader.info(), ImageMetadata::default());
+        metadata.warn_of_frames(info.animation_control().map_or(0, |control| control.num_frames));
         let is_gray = !self.color_type.has_color();
         if let Some(points) = info.coding_independent_code_points {
-            match space_of_points(points) {
-                Some(space) => facts.space = space,
-                None => facts.warn(unread_points(points)),
+            match space_of_code_points(points) {
+                Some(space) => metadata.space = space,
+                None => metadata.warn(unsupported_code_points(points)),
             }
         } else if info.srgb.is_some() {
         } else if let Some(profile) = &self.profile {
-            facts.add_profile(profile.as_deref(), is_gray);
+            metadata.add_profile(profile.as_deref(), is_gray);
         } else {
-            facts.space = self.space_of_numbers(&mut facts, is_gray);
+            metadata.space = self.space_of_gama_and_chrm(&mut metadata, is_gray);
         }
-        facts
+        metadata
     }
 
-    /// The space of the chunks `gAMA` and `cHRM`.
-    fn space_of_numbers(&self, facts: &mut Facts, is_gray: bool) -> ColorSpace {
+    /// Color space of the chunks `gAMA` and `cHRM`.
+    fn space_of_gama_and_chrm(&self, metadata: &mut ImageMetadata, is_gray: bool) -> ColorSpace {
         let info = self.reader.info();
         let curve = info.gama_chunk.map_or(Curve::Srgb, |gamma| curve(gamma.into_scaled()));
         let number = |number: png::ScaledFloat| f64::from(number.into_scaled()) / 100_000.0;
@@ -132,7 +132,7 @@ impl<R: BufRead + Seek> PngDecoder<R> {
             Primaries { red, green, blue, white }.to_rec_709()
         });
         if matrix.is_none() {
-            facts.warn("its cHRM chunk spans no colors and is ignored");
+            metadata.warn("a degenerate cHRM chunk is ignored");
         }
         ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), matrix.unwrap_or(DMat3::IDENTITY))
     }
@@ -166,7 +166,7 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
     }
 }
 
-/// The curve of a `gAMA` chunk in units of 1/100000. 1/2.2 is the usual statement of sRGB (PNG, 11.3.2.5).
+/// Curve of a `gAMA` chunk in units of 1/100000. 1/2.2 usually means sRGB (PNG, 11.3.2.5).
 fn curve(gamma: u32) -> Curve {
     const SRGB: u32 = 45_455;
     const TOLERANCE: u32 = 500;
@@ -177,9 +177,9 @@ fn curve(gamma: u32) -> Curve {
     }
 }
 
-/// The space of code points of video signals (ITU-T H.273, tables 2 and 3). `None` for codes without a meaning, for logarithmic
-/// curves and for samples that are not full-range RGB.
-fn space_of_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
+/// Color space of code points of video signals (ITU-T H.273, tables 2 and 3). `None` for undefined codes, for
+/// logarithmic curves, and for samples other than full-range RGB.
+fn space_of_code_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
     let primaries = match points.color_primaries {
         1 => Primaries::REC_709,
         4 => Primaries::from_numbers([0.67, 0.33, 0.21, 0.71, 0.14, 0.08, 0.310, 0.316]),
@@ -209,8 +209,8 @@ fn space_of_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpac
     is_plain.then(|| Some(ColorSpace::new(Some(curves), primaries.to_rec_709()?)))?
 }
 
-/// The warning about code points that are ignored.
-fn unread_points(points: png::CodingIndependentCodePoints) -> String {
+/// Warning about unsupported code points.
+fn unsupported_code_points(points: png::CodingIndependentCodePoints) -> String {
     let png::CodingIndependentCodePoints {
         color_primaries,
         transfer_function,
@@ -218,23 +218,23 @@ fn unread_points(points: png::CodingIndependentCodePoints) -> String {
         is_video_full_range_image,
     } = points;
     format!(
-        "its cICP chunk is ignored: primaries {color_primaries}, transfer function {transfer_function}, matrix \
-         {matrix_coefficients}, full range {is_video_full_range_image}; its colors count as sRGB"
+        "unsupported cICP chunk (primaries {color_primaries}, transfer function {transfer_function}, matrix \
+         {matrix_coefficients}, full range {is_video_full_range_image}); colors are read as sRGB"
     )
 }
 
-/// The color profile of a file, which is then at its start again.
-fn profile(file: &mut (impl Read + Seek)) -> io::Result<Option<Profile>> {
+/// Reads the color profile of a file, then rewinds the file.
+fn profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk>> {
     let profile = find_profile(file);
     file.seek(SeekFrom::Start(0))?;
     match profile {
-        // The decoder reports the end of the file.
+        // The decoder reports truncated files.
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
         profile => profile,
     }
 }
 
-fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<Profile>> {
+fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<ProfileChunk>> {
     const SIGNATURE: u64 = 8;
     const CHECKSUM: i64 = 4;
     file.seek(SeekFrom::Start(SIGNATURE))?;
@@ -249,15 +249,15 @@ fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<Profile>> {
             b"iCCP" => {
                 let mut chunk = vec![0; length as usize];
                 file.read_exact(&mut chunk)?;
-                return Ok(Some(unpacked(&chunk)));
+                return Ok(Some(decompressed(&chunk)));
             }
             _ => file.seek(SeekFrom::Current(i64::from(length) + CHECKSUM))?,
         };
     }
 }
 
-/// Unpacks a profile, which follows its name and a method, which is 0.
-fn unpacked(chunk: &[u8]) -> Option<Vec<u8>> {
+/// Decompresses a profile, which follows its name and a compression method of 0.
+fn decompressed(chunk: &[u8]) -> Option<Vec<u8>> {
     let name = memchr::memchr(0, chunk)?;
     let packed = chunk[name + 1..].strip_prefix(&[0])?;
     fdeflate::decompress_to_vec_bounded(packed, PROFILE_BYTES as usize).ok()

@@ -1,14 +1,14 @@
-//! Red, green and blue of a file, converted to those of Rec. 709.
+//! Conversion of colors between primaries.
 
 use crate::math::{DMat3, DVec3};
 
-/// Largest difference from the identity of a conversion that is left out: files round their primaries.
+/// Differences from the identity up to which a conversion is skipped: files contain rounded primaries.
 const TOLERANCE: f64 = 2e-3;
 
-/// XYZ of the white of ICC profiles, D50 (ICC.1, 6.3.4.3).
+/// XYZ of D50, the white of ICC profiles (ICC.1, 6.3.4.3).
 const D50: DVec3 = DVec3::new(0.9642, 1.0, 0.8249);
 
-/// Chromaticities (x, y) of primaries and of their white.
+/// Chromaticities (x, y) of primaries and white point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Primaries {
     pub(super) red: [f64; 2],
@@ -27,21 +27,21 @@ impl Primaries {
     /// Display P3 (SMPTE EG 432-1).
     pub(super) const DISPLAY_P3: Self =
         Self { red: [0.680, 0.320], green: [0.265, 0.690], blue: [0.150, 0.060], ..Self::REC_709 };
-    /// CIE XYZ, with the white of equal energy.
+    /// CIE XYZ with equal-energy white.
     pub(super) const XYZ: Self =
         Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 
-    /// Primaries in the order of files: red, green, blue, white.
+    /// Creates primaries from numbers in file order: red, green, blue, white.
     pub(super) fn from_numbers([rx, ry, gx, gy, bx, by, wx, wy]: [f64; 8]) -> Self {
         Self { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] }
     }
 
-    /// XYZ of the white, with Y = 1.
+    /// XYZ of the white point, with Y = 1.
     fn white(&self) -> DVec3 {
         xyz(self.white) / self.white[1]
     }
 
-    /// XYZ of each primary, scaled so that their sum is the white. `None` if the primaries span no colors.
+    /// Matrix to XYZ, scaled such that (1, 1, 1) is white. `None` for degenerate primaries.
     fn to_xyz(self) -> Option<DMat3> {
         let primaries = DMat3::from_cols(xyz(self.red), xyz(self.green), xyz(self.blue));
         let scales = inverse(primaries)? * self.white();
@@ -49,28 +49,28 @@ impl Primaries {
         inverse(matrix).is_some().then_some(matrix)
     }
 
-    /// Weights of red, green and blue in the luminance. `None` if the primaries span no colors.
+    /// Luminance weights of red, green and blue. `None` for degenerate primaries.
     pub(super) fn luminance_weights(self) -> Option<DVec3> {
         Some(self.to_xyz()?.row(1))
     }
 
-    /// Matrix to linear Rec. 709, adapted to its white (Bradford). `None` if the primaries span no colors.
+    /// Matrix to linear Rec. 709 with Bradford chromatic adaptation. `None` for degenerate primaries.
     pub(super) fn to_rec_709(self) -> Option<DMat3> {
         Some(rec_709_from_xyz(self.white())? * self.to_xyz()?)
     }
 }
 
-/// Matrix to linear Rec. 709 from the colorants of an ICC profile, in XYZ relative to D50.
+/// Matrix to linear Rec. 709 from the colorants of an ICC profile, given in XYZ relative to D50.
 pub(super) fn from_colorants(colorants: DMat3) -> Option<DMat3> {
     Some(rec_709_from_xyz(D50)? * colorants)
 }
 
-/// Whether a conversion changes nothing but for rounding.
+/// Whether a matrix is the identity up to rounding.
 pub(super) fn is_identity(matrix: &DMat3) -> bool {
     (*matrix - DMat3::IDENTITY).to_cols_array().iter().all(|entry| entry.abs() <= TOLERANCE)
 }
 
-/// Matrix from XYZ under this white to linear Rec. 709.
+/// Matrix from XYZ with this white point to linear Rec. 709.
 fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
     let to_cones = bradford();
     let [from, to] = [white, Primaries::REC_709.white()].map(|white| to_cones * white);
@@ -79,7 +79,7 @@ fn rec_709_from_xyz(white: DVec3) -> Option<DMat3> {
     matrix.is_finite().then_some(matrix)
 }
 
-/// Responses of sharpened cones to XYZ (Lam, *Metamerism and Colour Constancy*, University of Bradford, 1985).
+/// Bradford cone response matrix (Lam, *Metamerism and Colour Constancy*, University of Bradford, 1985).
 fn bradford() -> DMat3 {
     DMat3::from_cols_array(&[0.8951, -0.7502, 0.0389, 0.2664, 1.7135, -0.0685, -0.1614, 0.0367, 1.0296])
 }
@@ -88,7 +88,7 @@ fn xyz([x, y]: [f64; 2]) -> DVec3 {
     DVec3::new(x, y, 1.0 - x - y)
 }
 
-/// The inverse of a matrix that is far enough from singular.
+/// The inverse, unless the matrix is nearly singular.
 fn inverse(matrix: DMat3) -> Option<DMat3> {
     (matrix.determinant().abs() > 1e-9).then(|| matrix.inverse()).filter(|inverse| inverse.is_finite())
 }
@@ -98,19 +98,19 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn is_near(found: DVec3, expected: [f64; 3], tolerance: f64) {
+    fn assert_near(found: DVec3, expected: [f64; 3], tolerance: f64) {
         assert!((found - DVec3::from_array(expected)).length() < tolerance, "{found} {expected:?}");
     }
 
     #[test]
-    fn known_conversions_to_rec_709() {
+    fn conversions_to_rec_709_match_references() {
         let matrix = |primaries: Primaries| primaries.to_rec_709().expect("colors");
         assert!(is_identity(&matrix(Primaries::REC_709)));
         // ITU-R BT.2087, table 4, inverted.
         let rec_2020 = matrix(Primaries::REC_2020);
-        is_near(rec_2020 * DVec3::X, [1.6605, -0.1246, -0.0182], 1e-4);
-        is_near(rec_2020 * DVec3::Z, [-0.0728, -0.0083, 1.1187], 1e-4);
-        // Every white becomes white.
+        assert_near(rec_2020 * DVec3::X, [1.6605, -0.1246, -0.0182], 1e-4);
+        assert_near(rec_2020 * DVec3::Z, [-0.0728, -0.0083, 1.1187], 1e-4);
+        // White stays white.
         let ap0 = Primaries {
             red: [0.7347, 0.2653],
             green: [0.0, 1.0],
@@ -118,13 +118,13 @@ mod tests {
             white: [0.32168, 0.33767],
         };
         for primaries in [rec_2020, matrix(Primaries::XYZ), matrix(Primaries::DISPLAY_P3), matrix(ap0)] {
-            is_near(primaries * DVec3::ONE, [1.0; 3], 1e-12);
+            assert_near(primaries * DVec3::ONE, [1.0; 3], 1e-12);
         }
-        is_near(Primaries::REC_709.luminance_weights().expect("colors"), [0.2126, 0.7152, 0.0722], 1e-4);
+        assert_near(Primaries::REC_709.luminance_weights().expect("colors"), [0.2126, 0.7152, 0.0722], 1e-4);
     }
 
     #[test]
-    fn primaries_without_area_are_refused() {
+    fn degenerate_primaries_are_rejected() {
         let line = Primaries { green: [0.395, 0.195], ..Primaries::REC_709 };
         let black = Primaries { white: [0.3, 0.0], ..Primaries::REC_709 };
         let nan = Primaries { blue: [f64::NAN, 0.1], ..Primaries::REC_709 };
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn the_colorants_of_srgb_change_nothing() {
+    fn srgb_colorants_give_the_identity() {
         let colorants = DMat3::from_cols_array(&[
             0.43607, 0.22249, 0.01392, 0.38515, 0.71687, 0.09708, 0.14307, 0.06061, 0.71410,
         ]);

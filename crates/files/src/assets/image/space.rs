@@ -1,4 +1,4 @@
-//! The meaning of a file's red, green and blue: curves from samples to linear light, and primaries.
+//! Color spaces of image files: transfer curves and primaries.
 
 use std::f64::consts::E;
 
@@ -7,13 +7,13 @@ use crate::math::color::srgb_to_linear;
 use crate::math::elementary::pow_f64;
 use crate::math::{DMat3, DVec3};
 
-/// A curve from samples in [0, 1] to linear light.
+/// A transfer curve from samples in [0, 1] to linear light.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Curve {
     Srgb,
-    /// The sample to this power.
+    /// A power function with this exponent.
     Power(f64),
-    /// (a·x + b)^g + e from d on, below c·x + f (ICC.1, 10.18).
+    /// (a·x + b)^g + e for x ≥ d, c·x + f below (ICC.1, 10.18).
     Parametric {
         g: f64,
         a: f64,
@@ -23,17 +23,17 @@ pub(super) enum Curve {
         e: f64,
         f: f64,
     },
-    /// Values at equal distances, from 0 to 65535.
+    /// Equidistant values from 0 to 65535.
     Table(Vec<u16>),
-    /// Perceptual quantization (SMPTE ST 2084), with 1 for 203 cd/m².
+    /// Perceptual quantization (SMPTE ST 2084). 203 cd/m² is 1.
     Pq,
-    /// Hybrid log-gamma (ITU-R BT.2100, table 5), with 1 for a signal of 0.75: the light of the scene.
+    /// Hybrid log-gamma (ITU-R BT.2100, table 5), scene-referred. A signal of 0.75 is 1.
     Hlg,
 }
 
 impl Curve {
     pub(super) const LINEAR: Self = Self::Power(1.0);
-    /// The camera curve of ITU-R BT.709, inverted.
+    /// Inverse of the camera curve of ITU-R BT.709.
     pub(super) const REC_709: Self = Self::Parametric {
         g: 1.0 / 0.45,
         a: 1.0 / 1.099,
@@ -44,7 +44,7 @@ impl Curve {
         f: 0.0,
     };
 
-    /// The camera curve of SMPTE ST 240, inverted.
+    /// Inverse of the camera curve of SMPTE ST 240.
     pub(super) const SMPTE_240M: Self = Self::Parametric {
         g: 1.0 / 0.45,
         a: 1.0 / 1.1115,
@@ -55,7 +55,7 @@ impl Curve {
         f: 0.0,
     };
 
-    /// Linear light of a sample in [0, 1].
+    /// Converts a sample in [0, 1] to linear light.
     pub(super) fn decode(&self, x: f64) -> f64 {
         match self {
             Self::Srgb => f64::from(srgb_to_linear(x as f32)),
@@ -73,7 +73,7 @@ impl Curve {
         }
     }
 
-    /// Whether no byte differs from sRGB by more than its rounding in a profile.
+    /// Whether the curve is sRGB up to the rounding of values in a profile, for 8-bit samples.
     fn is_srgb(&self) -> bool {
         const TOLERANCE: f64 = 1.5e-3;
         *self == Self::Srgb
@@ -93,7 +93,7 @@ fn power(x: f64, exponent: f64) -> f64 {
     }
 }
 
-/// Light of a PQ signal, in units of the reference white (ITU-R BT.2408, 2.2).
+/// Decodes a PQ signal relative to the reference white (ITU-R BT.2408, 2.2).
 fn pq(x: f64) -> f64 {
     const MOST: f64 = 10_000.0 / 203.0;
     const M1: f64 = 2610.0 / 16384.0;
@@ -105,7 +105,7 @@ fn pq(x: f64) -> f64 {
     MOST * power((root - C1) / (C2 - C3 * root), 1.0 / M1)
 }
 
-/// Light of an HLG signal, up to 1.
+/// Decodes an HLG signal to [0, 1].
 fn hlg(x: f64) -> f64 {
     const A: f64 = 0.178_832_77;
     const B: f64 = 1.0 - 4.0 * A;
@@ -122,7 +122,7 @@ fn interpolated(values: &[u16], x: f64) -> f64 {
     (low + (high - low) * (at - first as f64)) / f64::from(u16::MAX)
 }
 
-/// A color space, as far as it differs from the usual one: sRGB for whole numbers, linear Rec. 709 for floats.
+/// Deviation of a color space from the default: sRGB for integers, linear Rec. 709 for floats.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ColorSpace {
     curves: Option<[Curve; 3]>,
@@ -130,7 +130,7 @@ pub(super) struct ColorSpace {
 }
 
 impl ColorSpace {
-    /// A space of curves, if they are not the usual ones, and a matrix to linear Rec. 709.
+    /// A color space with these curves (`None` for the default) and a matrix to linear Rec. 709.
     pub(super) fn new(curves: Option<[Curve; 3]>, matrix: DMat3) -> Self {
         Self {
             curves: curves.filter(|curves| !curves.iter().all(Curve::is_srgb)),
@@ -138,27 +138,27 @@ impl ColorSpace {
         }
     }
 
-    /// A space of other primaries.
+    /// A color space that differs only in its primaries.
     pub(super) fn of_matrix(matrix: DMat3) -> Self {
         Self::new(None, matrix)
     }
 
-    pub(super) fn is_usual(&self) -> bool {
+    pub(super) fn is_default(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Linear light of whole numbers from 0 to `most`, for red, green and blue.
-    pub(super) fn tables(&self, most: u16) -> [Vec<f32>; 3] {
+    /// Tables of linear light for integers from 0 to `max`, for red, green and blue.
+    pub(super) fn tables(&self, max: u16) -> [Vec<f32>; 3] {
         const SRGB: [Curve; 3] = [Curve::Srgb, Curve::Srgb, Curve::Srgb];
         let curves = self.curves.as_ref().unwrap_or(&SRGB);
         let table = |curve: &Curve| {
-            let samples = (0..=most).map(|sample| f64::from(sample) / f64::from(most));
+            let samples = (0..=max).map(|sample| f64::from(sample) / f64::from(max));
             samples.map(|x| curve.decode(x) as f32).collect()
         };
         [table(&curves[0]), table(&curves[1]), table(&curves[2])]
     }
 
-    /// Linear Rec. 709 of linear light in this space.
+    /// Converts linear light in this space to linear Rec. 709.
     pub(super) fn converted(&self, linear: [f32; 3]) -> [f32; 3] {
         let Some(matrix) = &self.matrix else { return linear };
         (*matrix * DVec3::from_array(linear.map(f64::from))).as_vec3().to_array()
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn curves_of_known_value() {
+    fn curves_match_known_values() {
         let parametric = Curve::Parametric {
             g: 2.4,
             a: 1.0 / 1.055,
@@ -190,26 +190,26 @@ mod tests {
     }
 
     #[test]
-    fn broadcast_curves_of_known_value() {
+    fn broadcast_curves_have_reference_values() {
         let is_near = |found: f64, exact: f64| (found - exact).abs() <= 1e-4 * exact;
-        // ITU-R BT.2408, table 1: signals of the reference white, of 1000 cd/m², of 18 % gray.
+        // ITU-R BT.2408, table 1: signals for the reference white, 1000 cd/m² and 18 % gray.
         for (signal, nits) in [(1.0, 10_000.0), (0.580_69, 203.0), (0.751_83, 1000.0), (0.0, 0.0)] {
             assert!(is_near(Curve::Pq.decode(signal), nits / 203.0), "{signal}");
         }
         for (signal, light) in [(1.0, 1.0), (0.5, 1.0 / 12.0), (0.75, 0.264_963), (0.0, 0.0)] {
             assert!(is_near(Curve::Hlg.decode(signal), light / 0.264_963), "{signal}");
         }
-        // Both parts of HLG meet.
+        // HLG is continuous.
         assert!(is_near(hlg(0.5), hlg(0.5 + 1e-9)));
     }
 
     #[test]
-    fn the_usual_space_is_recognized() {
+    fn the_default_space_is_recognized() {
         let srgb = || Some([Curve::Srgb, Curve::Srgb, Curve::Srgb]);
-        assert!(ColorSpace::new(srgb(), DMat3::IDENTITY).is_usual());
-        assert!(!ColorSpace::new(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))).is_usual());
+        assert!(ColorSpace::new(srgb(), DMat3::IDENTITY).is_default());
+        assert!(!ColorSpace::new(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))).is_default());
         assert!(
-            !ColorSpace::new(Some([Curve::Srgb, Curve::LINEAR, Curve::Srgb]), DMat3::IDENTITY).is_usual()
+            !ColorSpace::new(Some([Curve::Srgb, Curve::LINEAR, Curve::Srgb]), DMat3::IDENTITY).is_default()
         );
     }
 }

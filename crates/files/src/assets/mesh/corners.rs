@@ -1,8 +1,8 @@
-//! Corners with values of their own, which vertices do not have.
+//! Splits vertices whose corners have different attributes.
 
 use std::collections::HashMap;
 
-use super::parsed::Parsed;
+use super::parsed::ParsedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::Vec2;
@@ -10,22 +10,22 @@ use crate::math::Vec2;
 /// Corners between two polls of the token.
 const BATCH: usize = 1 << 14;
 
-/// A vertex with the values of a corner.
-type Key = (u32, [u32; 2], [u8; 3]);
+/// Vertex index, texture coordinates (bits) and color of a corner.
+type CornerKey = (u32, [u32; 2], [u8; 3]);
 
-/// Makes a vertex for each combination of a vertex, texture coordinates and a color that corners have. They keep the normal of
-/// the vertex.
-pub(super) fn split(parsed: &mut Parsed, token: &CancelToken) -> Result<(), Cancelled> {
+/// Creates a vertex for each distinct combination of vertex, texture coordinates and color among the corners.
+/// The new vertices keep the normal of the original one.
+pub(super) fn split(parsed: &mut ParsedMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
     let vertices = parsed.positions.len();
     let is_in_range = |corner: &u32| (*corner as usize) < vertices;
-    // A corner out of range is an error that is reported with its face.
+    // Leave indices out of range to the assembly, which reports their face.
     if (uvs.is_empty() && colors.is_empty()) || !parsed.faces.corners.iter().all(is_in_range) {
         return Ok(());
     }
     let mut sources = Vec::new();
     let (mut new_uvs, mut new_colors) = (Vec::new(), Vec::new());
-    let mut known: HashMap<Key, u32> = HashMap::new();
+    let mut known: HashMap<CornerKey, u32> = HashMap::new();
     for (place, corner) in parsed.faces.corners.iter_mut().enumerate() {
         if place % BATCH == 0 {
             token.check()?;
@@ -58,7 +58,7 @@ pub(super) fn split(parsed: &mut Parsed, token: &CancelToken) -> Result<(), Canc
     Ok(())
 }
 
-/// Takes the value of each source; an empty list stays empty.
+/// Replaces `values` by the value of each source. An empty list stays empty.
 fn take<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
     if !values.is_empty() {
         *values = sources.iter().map(|vertex| values[*vertex]).collect();

@@ -1,14 +1,14 @@
-//! Mesh files: OBJ with MTL, OFF, PLY, STL. Each parser gives the numbers as the file has them; `assemble` makes a mesh of
-//! them that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
+//! Mesh files: OBJ with MTL, OFF, PLY and STL. Each parser returns the file's numbers; `assemble` builds a
+//! valid [`TriangleMesh`](crate::geometry::mesh::TriangleMesh) from them.
 
 pub(crate) mod assemble;
+mod coincident;
 mod corners;
 mod mtl;
 pub(crate) mod normals;
 mod obj;
 mod off;
 pub(crate) mod parsed;
-mod places;
 pub mod ply;
 mod polygon;
 mod stl;
@@ -16,63 +16,76 @@ mod text;
 
 use std::path::Path;
 
-use super::read::{self, Watch};
+use super::read::{self, Monitor};
 use super::{AssetError, LoadedMesh};
 use crate::control::{CancelToken, Progress};
 
 pub use normals::vertex_normals;
 
-/// Most bytes of a mesh file.
+/// Maximum size of a mesh file.
 const FILE_LIMIT: u64 = 4 << 30;
 
-/// The endings that [`load`] knows.
+/// File name extensions that [`load`] supports.
 pub const ENDINGS: [&str; 4] = ["obj", "off", "ply", "stl"];
 
-/// Reads a mesh file; its ending, in any case, chooses the format.
+/// Reads a mesh file in the format given by its extension, ignoring case.
 ///
-/// Polygons are cut into triangles; unusable faces are left out and counted; unused vertices are left out. Normals are
-/// unit vectors: if some are missing they are computed, if the file has none the mesh has none. v of texture
-/// coordinates is the file's (0 at the bottom). Progress is in bytes; reading and parsing each count the file once.
+/// Polygons are triangulated; unusable faces are skipped and counted; unused vertices are removed. Normals
+/// have unit length: missing ones are computed, but a file without any normals gives a mesh without normals.
+/// The texture coordinate v is 0 at the bottom, as in the file. Progress is in bytes; reading and parsing
+/// each count the file once.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`] if the file is not a regular one of a known ending and sensible size;
-/// [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is wrong or has no usable face;
+/// [`AssetError::Unreadable`] if the file is not a regular file with a known extension and at most 4 GiB;
+/// [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is invalid or has no
+/// usable face;
 /// [`AssetError::Cancelled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
-    let (parse, read): (Parser, Reader) = match ending.as_str() {
+    let extension =
+        path.extension().map(|extension| extension.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let (parse, read): (ParseFn, ReadFn) = match extension.as_str() {
         "obj" => (obj::parse, read::text),
-        "off" => (off::parse, read::lettered),
-        "ply" => (ply::parse, read::lettered),
-        "stl" => (stl::parse, read::not_blank),
-        _ => return Err(AssetError::unreadable(path, "meshes end in .obj, .off, .ply or .stl")),
+        "off" => (off::parse, read::text_or_binary),
+        "ply" => (ply::parse, read::text_or_binary),
+        "stl" => (stl::parse, read::not_all_zero),
+        _ => return Err(AssetError::unreadable(path, UNKNOWN_FORMAT)),
     };
-    let watch = Watch { progress, token };
-    let bytes = read(path, FILE_LIMIT, watch)?;
-    let source = Source { path, bytes: text::without_mark(&bytes), watch };
+    let monitor = Monitor { progress, token };
+    let bytes = read(path, FILE_LIMIT, monitor)?;
+    let source = MeshSource { path, bytes: text::without_mark(&bytes), monitor };
     if source.bytes.is_empty() {
-        return Err(source.wrong("the file is empty"));
+        return Err(source.wrong(EMPTY_FILE));
     }
     let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
-    watch.tick(2 * bytes.len(), 2 * bytes.len())?;
+    monitor.tick(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }
 
-type Parser = fn(&Source<'_>) -> Result<LoadedMesh, AssetError>;
-type Reader = fn(&Path, u64, Watch<'_>) -> Result<Vec<u8>, AssetError>;
+const UNKNOWN_FORMAT: &str = "unknown mesh format; the extension must be .obj, .off, .ply or .stl";
 
-/// A file in memory, with the watch on its parsing.
-#[derive(Clone, Copy)]
-pub(crate) struct Source<'a> {
-    pub(crate) path: &'a Path,
-    pub(crate) bytes: &'a [u8],
-    pub(crate) watch: Watch<'a>,
+/// Reason to reject a file without content.
+const EMPTY_FILE: &str = "the file is empty";
+
+/// Reason to reject a vertex index of a file with `count` vertices, numbered from 0.
+pub(crate) fn vertex_out_of_range(vertex: i64, count: u64) -> String {
+    format!("vertex {vertex} is out of range: there are {count}, numbered from 0")
 }
 
-impl Source<'_> {
-    /// Reports that the parser is at this byte.
+type ParseFn = fn(&MeshSource<'_>) -> Result<LoadedMesh, AssetError>;
+type ReadFn = fn(&Path, u64, Monitor<'_>) -> Result<Vec<u8>, AssetError>;
+
+/// A mesh file in memory, and the monitor of its parsing.
+#[derive(Clone, Copy)]
+pub(crate) struct MeshSource<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) bytes: &'a [u8],
+    pub(crate) monitor: Monitor<'a>,
+}
+
+impl MeshSource<'_> {
+    /// Reports that the parser has reached byte `at`.
     fn tick(&self, at: usize) -> Result<(), AssetError> {
-        Ok(self.watch.tick(self.bytes.len() + at, 2 * self.bytes.len())?)
+        Ok(self.monitor.tick(self.bytes.len() + at, 2 * self.bytes.len())?)
     }
 
     /// An error about the whole file.
@@ -80,12 +93,12 @@ impl Source<'_> {
         AssetError::malformed(self.path, None, reason)
     }
 
-    /// An error at a byte of a text file.
+    /// An error at byte `at` of a text file.
     fn wrong_at(&self, at: usize, reason: impl Into<String>) -> AssetError {
         AssetError::malformed(self.path, Some(self.line(at)), reason)
     }
 
-    /// The line of a byte, from 1.
+    /// The line that contains byte `at`, from 1.
     fn line(&self, at: usize) -> usize {
         let before = &self.bytes[..at.min(self.bytes.len())];
         1 + memchr::memchr_iter(b'\n', before).count()
@@ -95,6 +108,7 @@ impl Source<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assets::rejection;
     use crate::control::ignore_progress;
     use proptest::prelude::*;
     use std::fs;
@@ -108,16 +122,14 @@ mod tests {
     }
 
     #[test]
-    fn the_ending_chooses_in_any_case() {
+    fn extensions_ignore_case() {
         let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
         assert_eq!(try_bytes("A.OFF", off).expect("read").mesh.triangles, [[0, 1, 2]]);
-        assert!(
-            try_bytes("a.xyz", off).expect_err("refused").to_string().contains(".obj, .off, .ply or .stl")
-        );
+        assert_eq!(rejection(try_bytes("a.xyz", off)), (None, UNKNOWN_FORMAT.to_owned()));
     }
 
     #[test]
-    fn a_byte_order_mark_is_no_part_of_the_first_word() {
+    fn a_byte_order_mark_is_skipped() {
         let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
             element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
         for (name, text) in [
@@ -133,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn progress_never_falls_and_ends_at_the_total() {
+    fn progress_increases_up_to_the_total() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("many.off");
         let mut text = "OFF\n3 100000 0\n0 0 0\n1 0 0\n0 1 0\n".to_owned();
@@ -148,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cancelled_load_stops() {
+    fn a_cancelled_load_returns_cancelled() {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text) in [("a.off", "OFF 3 1 0"), ("a.ply", "ply\n"), ("a.obj", "v 0 0 0\n")] {
             let path = folder.path().join(name);
@@ -159,7 +171,7 @@ mod tests {
         }
     }
 
-    /// Text made of the words of mesh files, so that parsers get past their first line.
+    /// Text made of keywords of mesh files, so that parsers get past the first line.
     fn wordy() -> impl Strategy<Value = String> {
         let words = "OFF COFF STOFF 4OFF ply format ascii binary_little_endian 1.0 element vertex face property \
                      list uchar int float x y z vertex_indices end_header v vt vn f l g o usemtl mtllib \
@@ -185,7 +197,7 @@ mod tests {
         }
 
         #[test]
-        fn what_loads_keeps_the_invariants(
+        fn loaded_meshes_are_valid(
             coordinates in proptest::collection::vec(
                 proptest::sample::select(vec!["0", "1", "2", "-1", "nan", "1e999", "0.5"]), 24),
             corners in proptest::collection::vec(0_u32..8, 3..40),

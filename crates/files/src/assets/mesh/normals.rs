@@ -1,28 +1,31 @@
-//! Vertex normals for files without them: each face counts by its angle at the vertex (Thürmer and Wüthrich, *Computing
-//! Vertex Normals from Polygonal Facets*, JGT 1998), so that the triangulation of a surface does not show.
+//! Vertex normals for files without them. Each face is weighted by its angle at the vertex (Thürmer and
+//! Wüthrich, *Computing Vertex Normals from Polygonal Facets*, JGT 1998), so that the normals do not depend
+//! on the triangulation.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use rayon::prelude::*;
 
-use super::places;
+use super::coincident;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 
-/// Least cosine between normals of one surface: vertices at one place belong together if their own normals agree within
-/// 45 degrees (a texture's seam); otherwise they form an edge (a box whose file separates its sides).
+/// Minimum cosine between normals that are merged. Coincident vertices are joined if their normals agree
+/// within 45 degrees (a texture seam); otherwise they form an edge (a box with separate sides).
 const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Most vertices at one place that are compared, each with each, which is quadratic; more are all taken together.
+/// Maximum number of coincident vertices to compare pairwise, which is quadratic. Larger sets are merged
+/// without comparing.
 const COMPARED: usize = 64;
 
-/// Triangles, and vertices, between two polls of the token.
+/// Triangles or vertices between two polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
-/// A unit normal for each vertex, weighted by angle, on the front side of the faces around it. Vertices that the file
-/// separates at one place get one normal if they are of one [`NormalGroup`] and their own normals agree within 45 degrees. If faces cancel each other, the vertex
-/// gets one face's normal. The result does not depend on the number of threads.
+/// Computes a unit normal for each vertex, weighted by angle, on the front side of its faces. Coincident
+/// vertices share a normal if they are in the same [`NormalGroup`] and their normals agree within 45 degrees.
+/// If faces cancel each other, the vertex gets the normal of one face. The result does not depend on the
+/// number of threads.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -34,7 +37,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
         let own = std::mem::take(&mut sums[vertex]);
         sums[*first] += own;
     }
-    let places = places::shared(&mesh.positions, token)?;
+    let places = coincident::find(&mesh.positions, token)?;
     let mut joined = sums.clone();
     for place in &places {
         token.check()?;
@@ -65,7 +68,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
-/// The first vertex that has the normal of each vertex; empty without groups.
+/// For each vertex, the first vertex with the same normal. Empty without groups.
 fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
     let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
     let mut firsts = vec![usize::MAX; numbers];
@@ -77,9 +80,11 @@ fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
     groups.iter().enumerate().map(first_of).collect()
 }
 
-/// Whether a mesh without normals is of flat faces, as a box is: the normals of the faces around most vertices cancel in part.
+/// Whether a mesh without normals consists of flat faces, like a box: the normals of the faces around most
+/// vertices partly cancel.
 pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
-    /// Least length of the mean of the unit normals around a vertex of a smooth surface: a cone of 32 degrees about them.
+    /// Minimum length of the mean unit normal around a vertex of a smooth surface: that of a cone with a
+    /// half-angle of 32 degrees.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;
     if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != NormalGroup::BY_ANGLE) {
@@ -103,7 +108,7 @@ pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
     total < f64::from(LEAST) * f64::from(vertices)
 }
 
-/// Replaces normals of zero.
+/// Replaces zero normals.
 pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let made = vertex_normals(mesh, token)?;
     for (normal, made) in mesh.normals.iter_mut().zip(made) {
@@ -114,8 +119,8 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
     Ok(())
 }
 
-/// Sums at each vertex the unit normals of its faces times their angles there, in the order of the faces. Every thread
-/// has its own vertices, so that the order does not depend on the threads.
+/// Sums the unit normals of each vertex's faces, weighted by their angles, in the order of the faces. Each
+/// thread owns a range of vertices, so that the order does not depend on the number of threads.
 fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
@@ -142,8 +147,8 @@ fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>,
     Ok(sums)
 }
 
-/// Unit normal (0 without area) and the angle at each corner. The arc tangent keeps the tiny angles of slivers,
-/// which an arc cosine loses.
+/// Returns the unit normal (0 without area) and the angle at each corner. Unlike an arccosine, the arctangent
+/// is accurate for the tiny angles of slivers.
 fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     let (ab, bc, ca) = (b - a, c - b, a - c);
@@ -156,8 +161,8 @@ fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     (cross / doubled_area, [angle(ca, ab), angle(ab, bc), angle(bc, ca)])
 }
 
-/// The angle of (x, y) for y > 0, with a relative error of at most 2e-8 (Abramowitz and Stegun, *Handbook of
-/// Mathematical Functions*, 4.4.49): more than weights need, and without branches that no processor can predict.
+/// Computes `atan2(y, x)` for y > 0 with a relative error of at most 2e-8 (Abramowitz and Stegun, *Handbook
+/// of Mathematical Functions*, 4.4.49): accurate enough for weights, without unpredictable branches.
 fn angle(x: f64, y: f64) -> f64 {
     const STARTS: [f64; 4] = [0.0, FRAC_PI_2, PI, FRAC_PI_2];
     const SIGNS: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
@@ -186,7 +191,7 @@ fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     }
 }
 
-/// For vertices whose faces cancel: the normal of one of these faces; up if there is none.
+/// Gives vertices whose faces cancel out the normal of one of their faces, or +y without faces.
 fn take_face_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],
@@ -213,7 +218,7 @@ mod tests {
     use super::*;
 
     fn vertex_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
-        super::vertex_normals(mesh, &CancelToken::new()).expect("nobody cancels")
+        super::vertex_normals(mesh, &CancelToken::new()).expect("not cancelled")
     }
 
     fn mesh(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleMesh {
@@ -222,9 +227,9 @@ mod tests {
     }
 
     #[test]
-    fn a_cubes_corner_points_along_its_diagonal_however_it_is_cut() {
-        // Three right angles meet at the origin; one face is cut in two there. Weights by area or by count
-        // would lean towards it.
+    fn cube_corner_normals_ignore_the_triangulation() {
+        // Three right angles meet at the origin; one of its faces is split there. Weights by area or by count
+        // would pull the normal towards it.
         let corner = mesh(
             &[[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.]],
             &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]],
@@ -234,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seam_does_not_show_and_an_edge_does() {
+    fn seams_are_smooth_and_edges_are_sharp() {
         // Two quads folded by `height`, with separate vertices along the fold.
         let folded = |height: f32| {
             mesh(
@@ -258,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_that_cancel_leave_one_of_their_normals() {
+    fn cancelling_faces_leave_one_of_their_normals() {
         let normals = vertex_normals(&mesh(
             &[[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [9., 9., 9.]],
             &[[0, 1, 2], [0, 2, 1]],
@@ -268,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn slivers_and_extremes_give_unit_normals() {
+    fn slivers_and_extreme_scales_give_unit_normals() {
         for scale in [1e-20_f32, 1.0, 1e30] {
             let sliver = mesh(
                 &[[0., 0., 0.], [scale, 0., 0.], [0.5 * scale, 1e-7 * scale, 0.], [0.5 * scale, 0., scale]],
@@ -281,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_are_those_of_the_arc_tangent() {
+    fn angles_match_atan2() {
         for i in 0..1000 {
             let (x, y) = ((f64::from(i) * 0.7).sin() * 3.0, (0.02 * f64::from(i) - 15.0).exp());
             let exact = y.atan2(x);
@@ -290,24 +295,24 @@ mod tests {
     }
 
     #[test]
-    fn cancelled_work_stops_and_threads_change_nothing() {
+    fn normals_do_not_depend_on_thread_count() {
         let at = |i: u32| [(i % 300) as f32, (i / 300) as f32, (i as f32 * 0.37).sin()];
         let positions: Vec<_> = (0..90_000).map(at).collect();
         let triangles: Vec<_> =
             (0..89_699).flat_map(|i| [[i, i + 1, i + 300], [i + 1, i + 301, i + 300]]).collect();
         let mesh = mesh(&positions, &triangles);
-        let by = |threads| {
+        let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             pool.install(|| vertex_normals(&mesh))
         };
-        assert_eq!(by(1), by(3));
+        assert_eq!(with(1), with(3));
         let token = CancelToken::new();
         token.cancel();
         assert_eq!(super::vertex_normals(&mesh, &token), Err(Cancelled));
     }
 
     #[test]
-    fn many_vertices_at_one_place_are_quick() {
+    fn many_coincident_vertices_are_fast() {
         let count = 200_000;
         let mut positions = vec![[0.0; 3]; count];
         positions.extend([[1., 0., 0.], [0., 1., 0.]]);
@@ -316,8 +321,8 @@ mod tests {
         assert!(vertex_normals(&mesh(&positions, &triangles)).iter().all(|normal| *normal == Vec3::Z));
     }
 
-    /// A grid of so many rows and columns over a sphere, whose neighbours share vertices.
-    fn ball(rows: u32) -> TriangleMesh {
+    /// A sphere of `rows` rows and 2 · `rows` columns of quads that share vertices.
+    fn sphere(rows: u32) -> TriangleMesh {
         let at = |i: u32| {
             let (row, column) = (i / (2 * rows), i % (2 * rows));
             let (polar, turn) = (std::f32::consts::PI / rows as f32 * (row as f32 + 0.5)).sin_cos();
@@ -335,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_is_faceted_and_a_ball_is_not() {
+    fn boxes_are_faceted_and_spheres_are_not() {
         let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
         let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
@@ -343,7 +348,7 @@ mod tests {
             TriangleMesh { positions: (0..8).map(corner).collect(), triangles, ..TriangleMesh::default() };
         assert!(is_faceted(&cube));
         cube.normals = vec![Vec3::Y; 8];
-        assert!(!is_faceted(&cube), "its file says how it is shaded");
-        assert!(!is_faceted(&ball(8)) && !is_faceted(&ball(60)));
+        assert!(!is_faceted(&cube), "it has normals");
+        assert!(!is_faceted(&sphere(8)) && !is_faceted(&sphere(60)));
     }
 }

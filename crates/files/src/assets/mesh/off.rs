@@ -1,126 +1,180 @@
-//! OFF: a header word, counts, a vertex a line, a polygon a line (Geomview's manual, section *OFF*). Real files vary:
-//! counts behind the header word, no edge count, undeclared columns behind coordinates and faces, comments and blank
-//! lines anywhere.
+//! OFF: a header keyword, counts, one vertex per line, one polygon per line (Geomview manual, section *OFF*).
+//! Many files deviate: counts directly after the keyword, no edge count, undeclared columns after coordinates
+//! and faces, comments and blank lines anywhere.
 
 use super::assemble::assemble_text;
-use super::parsed::{ColorRange, Parsed};
-use super::text::{Cursor, shown};
-use super::{AssetError, LoadedMesh, Source};
+use super::parsed::{ColorRange, FACE_COLORS_IGNORED, ParsedMesh, alpha_ignored};
+use super::text::{Cursor, expected, expected_at_line_end, shown};
+use super::{AssetError, EMPTY_FILE, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Lines between two polls of the token.
+/// Vertices or faces between two polls of the cancel token.
 const BATCH: u64 = 1 << 13;
 
-/// Columns of each vertex according to the header word.
+/// Vertex columns declared by the header keyword.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Header {
+struct OffHeader {
     uvs: bool,
     normals: bool,
     colors: bool,
-    /// A fourth coordinate that divides the others.
+    /// Homogeneous coordinates: a fourth coordinate divides the others.
     homogeneous: bool,
 }
 
-pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
+pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     let (excess, indices) = Default::default();
-    Reader { source: *source, cursor: Cursor::new(source.bytes, 0), excess, indices }.read()
+    OffReader { source: *source, cursor: Cursor::new(source.bytes, 0), excess, indices }.read()
 }
 
 #[derive(Clone, Copy)]
-struct Reader<'a> {
-    source: Source<'a>,
+struct OffReader<'a> {
+    source: MeshSource<'a>,
     cursor: Cursor<'a>,
-    /// Lines with numbers that the header does not name.
-    excess: Lines,
-    /// Lines whose color is a number in a colormap.
-    indices: Lines,
+    /// Lines with undeclared numbers.
+    excess: IgnoredLines,
+    /// Lines whose color is an index into a colormap.
+    indices: IgnoredLines,
 }
 
-/// Lines to warn of: their number, and a byte of the first.
+/// Lines to warn about: their count, and the byte offset of the first.
 #[derive(Clone, Copy, Default)]
-struct Lines(u64, usize);
+struct IgnoredLines(u64, usize);
 
-impl Lines {
+impl IgnoredLines {
     fn add(&mut self, at: usize) {
         self.1 = if self.0 == 0 { at } else { self.1 };
         self.0 += 1;
     }
 
-    fn warning(self, source: &Source<'_>, what: &str) -> Option<String> {
+    fn warning(self, source: &MeshSource<'_>, ignored: &str) -> Option<String> {
         let Self(count, first) = self;
-        let line = source.line(first);
-        match count {
-            0 => None,
-            1 => Some(format!("line {line} has {what}: ignored")),
-            _ => Some(format!("line {line} and {} more have {what}: ignored", count - 1)),
-        }
+        (count > 0).then(|| ignored_lines(source.line(first), count, ignored))
     }
 }
 
-/// Colors of vertices or corners, where they have some.
+/// Warning about `count` lines of which something is ignored.
+fn ignored_lines(first: usize, count: u64, ignored: &str) -> String {
+    match count {
+        1 => format!("line {first}: ignored {ignored}"),
+        _ => format!("line {first} and {} more: ignored {ignored}", count - 1),
+    }
+}
+
+const UNDECLARED: &str = "numbers that the header does not declare";
+const COLOR_INDEX: &str = "a color index without a colormap";
+const BINARY_OFF: &str = "binary OFF is not supported; convert it to text or PLY";
+const NOT_OFF: &str = "OFF";
+
+fn unsupported_variant(keyword: &[u8]) -> String {
+    format!("{} is not a supported OFF variant", shown(keyword))
+}
+
+fn missing_count(of: &str) -> String {
+    format!("the file ends before the number of {of}")
+}
+
+fn negative_count(of: &str, number: i64) -> String {
+    format!("the number of {of} is {number}")
+}
+
+fn number_of(of: &str) -> String {
+    format!("the number of {of}")
+}
+
+fn counts_not_alone(found: &[u8]) -> String {
+    let found = shown(found);
+    format!(
+        "expected the end of the line after the three counts, found {found}; put each vertex and each face on its own line"
+    )
+}
+
+fn implausible(vertices: u64, faces: u64, remaining: u64) -> String {
+    let count =
+        |number: u64, one: &str, many: &str| format!("{number} {}", if number == 1 { one } else { many });
+    let claim = format!(
+        "the header claims {} and {}",
+        count(vertices, "vertex", "vertices"),
+        count(faces, "face", "faces")
+    );
+    match remaining {
+        0 => format!("{claim}, but the file ends there"),
+        _ => format!("{claim}, but only {} follow", count(remaining, "byte", "bytes")),
+    }
+}
+
+fn truncated(index: u64, count: u64, items: &str) -> String {
+    format!("the file ends after {index} of {count} {items}")
+}
+
+fn too_many_corners(arity: usize) -> String {
+    format!("a face claims {arity} corners, more than the file can hold")
+}
+
+fn short_face(corner: usize, arity: usize) -> String {
+    format!("a face of {arity} corners ends after {corner}")
+}
+
+/// Colors of vertices or corners, where present.
 #[derive(Default)]
-struct Colors {
+struct OffColors {
     all: Vec<Option<[f64; 3]>>,
     range: ColorRange,
-    /// The least alpha, and a byte of its line.
+    /// Minimum alpha, and a byte offset in its line.
     least_alpha: Option<(f64, usize)>,
 }
 
-impl Colors {
+impl OffColors {
     /// Adds the color for `times` vertices or corners.
     fn push(&mut self, color: &[f64], times: usize) {
         let color: Option<[f64; 3]> = color.first_chunk().copied().inspect(|color| self.range.add(*color));
         self.all.extend(std::iter::repeat_n(color, times));
     }
 
-    fn alpha(&mut self, alpha: f64, at: usize) {
+    fn add_alpha(&mut self, alpha: f64, at: usize) {
         if self.least_alpha.is_none_or(|(least, _)| alpha < least) {
             self.least_alpha = Some((alpha, at));
         }
     }
 
-    /// All colors in bytes, white where there is none; empty if there are none at all.
-    fn finish(self, source: &Source<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+    /// Colors as bytes, with white for missing ones. Empty if there are none at all.
+    fn finish(self, source: &MeshSource<'_>, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
         if self.all.iter().all(Option::is_none) {
             return Vec::new();
         }
         if let Some((_, at)) = self.least_alpha.filter(|(least, _)| *least < self.range.one()) {
-            let line = source.line(at);
-            warnings.push(format!("line {line}: the alpha of the colors is ignored"));
+            warnings.push(alpha_ignored(source.line(at)));
         }
         let bytes = |color: Option<[f64; 3]>| color.map_or([u8::MAX; 3], |color| self.range.bytes(color));
         self.all.into_iter().map(bytes).collect()
     }
 }
 
-impl Reader<'_> {
+impl OffReader<'_> {
     fn read(mut self) -> Result<LoadedMesh, AssetError> {
         let header = self.header()?;
         let vertices = self.count("vertices")?;
         let faces = self.count("faces")?;
         self.end_counts()?;
         self.plausible(vertices, faces)?;
-        let mut parsed = Parsed::default();
+        let mut parsed = ParsedMesh::default();
         self.vertices(header, vertices, &mut parsed)?;
         let before_faces = self;
         let colors = self.faces(vertices, faces, &mut parsed)?;
-        let own_colors = colors.finish(&self.source, &mut parsed.warnings);
+        let face_colors = colors.finish(&self.source, &mut parsed.warnings);
         if parsed.colors.is_empty() {
-            parsed.corner_colors = own_colors;
-        } else if !own_colors.is_empty() {
-            parsed.warnings.push("the colors of the faces are ignored: the vertices have colors".to_owned());
+            parsed.corner_colors = face_colors;
+        } else if !face_colors.is_empty() {
+            parsed.warnings.push(FACE_COLORS_IGNORED.to_owned());
         }
-        parsed.warnings.extend(self.excess.warning(&self.source, "more numbers than the header names"));
-        parsed
-            .warnings
-            .extend(self.indices.warning(&self.source, "an index into a colormap that is elsewhere"));
+        parsed.warnings.extend(self.excess.warning(&self.source, UNDECLARED));
+        parsed.warnings.extend(self.indices.warning(&self.source, COLOR_INDEX));
         assemble_text(&self.source, parsed, |face| before_faces.start_of_face(vertices, face))
     }
 
-    /// Offset of a face, counted from 0, for a reader at the first one.
+    /// Byte offset of a face by its index. The reader must be at the first face.
     fn start_of_face(&self, vertices: u64, face: usize) -> Option<usize> {
         let mut ahead = *self;
-        ahead.faces(vertices, face as u64, &mut Parsed::default()).ok()?;
+        ahead.faces(vertices, face as u64, &mut ParsedMesh::default()).ok()?;
         ahead.cursor.skip_blank();
         Some(ahead.cursor.at())
     }
@@ -131,110 +185,95 @@ impl Reader<'_> {
 
     fn unexpected<T>(&self, wanted: &str) -> Result<T, AssetError> {
         let mut ahead = self.cursor;
-        self.wrong(format!("expected {wanted}, found {}", shown(ahead.word())))
+        self.wrong(expected(wanted, ahead.word()))
     }
 
-    /// Reads the header word: `[ST][C][N][4]OFF`. Counts may follow it without a blank, and it may be missing.
-    fn header(&mut self) -> Result<Header, AssetError> {
+    /// Reads the optional header keyword `[ST][C][N][4]OFF`. Counts may follow it without a blank.
+    fn header(&mut self) -> Result<OffHeader, AssetError> {
         if !self.cursor.skip_blank() {
-            return self.wrong("the file is empty");
+            return self.wrong(EMPTY_FILE);
         }
         let start = self.cursor;
         let word = self.cursor.word();
         if word[0].is_ascii_digit() && !word.ends_with(b"OFF") {
             self.cursor = start;
-            return Ok(Header::default());
+            return Ok(OffHeader::default());
         }
         let Some(end) = word.windows(3).position(|part| part == b"OFF") else {
             self.cursor = start;
-            return self.wrong(format!("expected OFF, found {}", shown(word)));
+            return self.wrong(expected(NOT_OFF, word));
         };
-        let (kind, behind) = (&word[..end], &word[end + 3..]);
-        let known = kind.iter().all(|letter| b"STCN4".contains(letter));
-        if !known || !behind.iter().all(u8::is_ascii_digit) {
-            return self.wrong(format!("{} is no kind of OFF that can be read", shown(word)));
+        let (flags, digits) = (&word[..end], &word[end + 3..]);
+        let known = flags.iter().all(|letter| b"STCN4".contains(letter));
+        if !known || !digits.iter().all(u8::is_ascii_digit) {
+            return self.wrong(unsupported_variant(word));
         }
-        self.cursor = Cursor::new(self.source.bytes, self.cursor.at() - behind.len());
+        self.cursor = Cursor::new(self.source.bytes, self.cursor.at() - digits.len());
         self.refuse_binary()?;
-        let has = |letter| kind.contains(&letter);
-        Ok(Header { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
+        let has = |letter| flags.contains(&letter);
+        Ok(OffHeader { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
     }
 
     fn refuse_binary(&mut self) -> Result<(), AssetError> {
         let mut ahead = self.cursor;
         if ahead.skip_in_line() && ahead.word() == b"BINARY" {
-            return self.wrong("binary OFF files are not read; write it as text or PLY");
+            return self.wrong(BINARY_OFF);
         }
         Ok(())
     }
 
     fn count(&mut self, of: &str) -> Result<u64, AssetError> {
         if !self.cursor.skip_blank() {
-            let reason = format!("the file ends before the number of {of}");
-            return Err(self.source.wrong_at(self.source.bytes.trim_ascii_end().len(), reason));
+            let end = self.source.bytes.trim_ascii_end().len();
+            return Err(self.source.wrong_at(end, missing_count(of)));
         }
         self.number(of)
     }
 
-    /// Reads the whole number ≥ 0 that starts here.
+    /// Reads the nonnegative integer that starts here.
     fn number(&mut self, of: &str) -> Result<u64, AssetError> {
         match self.cursor.integer() {
             Some(number) => match u64::try_from(number) {
                 Ok(number) => Ok(number),
-                Err(_) => self.wrong(format!("the number of {of} is {number}")),
+                Err(_) => self.wrong(negative_count(of, number)),
             },
-            None => self.unexpected(&format!("the number of {of}")),
+            None => self.unexpected(&number_of(of)),
         }
     }
 
-    /// Reads the number of edges, which nothing needs and which may be missing.
+    /// Reads the optional number of edges, which is not used, and the end of the line.
     fn end_counts(&mut self) -> Result<(), AssetError> {
         if self.cursor.skip_in_line() {
             self.number("edges")?;
         }
         if self.cursor.skip_in_line() {
             let mut ahead = self.cursor;
-            return self.wrong(format!(
-                "expected the line's end behind the three counts, found {}; each vertex and each face stands on a line \
-                 of its own",
-                shown(ahead.word())
-            ));
+            return self.wrong(counts_not_alone(ahead.word()));
         }
         self.cursor.end_line();
         Ok(())
     }
 
-    /// Checks the counts: a vertex takes at least 6 bytes, a face at least 2; a header that claims more is wrong.
+    /// Checks the counts against the file's size: a vertex takes at least 6 bytes, a face at least 2.
     fn plausible(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
         let remaining = self.cursor.remaining() as u64;
         if needed > remaining + 1 || vertices > u64::from(u32::MAX) {
-            let count = |number: u64, one: &str, many: &str| {
-                format!("{number} {}", if number == 1 { one } else { many })
-            };
-            let claim = format!(
-                "the header claims {} and {}",
-                count(vertices, "vertex", "vertices"),
-                count(faces, "face", "faces")
-            );
-            let reason = match remaining {
-                0 => format!("{claim}, and the file ends behind it"),
-                _ => format!("{claim}, and only {} follow", count(remaining, "byte", "bytes")),
-            };
+            let reason = implausible(vertices, faces, remaining);
             return Err(self.source.wrong_at(self.cursor.at().saturating_sub(1), reason));
         }
         Ok(())
     }
 
-    fn vertices(&mut self, header: Header, count: u64, parsed: &mut Parsed) -> Result<(), AssetError> {
+    fn vertices(&mut self, header: OffHeader, count: u64, parsed: &mut ParsedMesh) -> Result<(), AssetError> {
         parsed.positions.reserve(count as usize);
-        let mut colors = Colors::default();
+        let mut colors = OffColors::default();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
             }
             if !self.cursor.skip_blank() {
-                return self.wrong(format!("the file ends after {index} of {count} vertices"));
+                return self.wrong(truncated(index, count, "vertices"));
             }
             let position = self.triple("a coordinate")?;
             let divisor = if header.homogeneous { self.float("a coordinate")? } else { 1.0 };
@@ -247,7 +286,7 @@ impl Reader<'_> {
                 let (color, uv) = rest.split_at(rest.len().saturating_sub(if header.uvs { 2 } else { 0 }));
                 if header.uvs {
                     let [u, v] = *uv else {
-                        return self.wrong("expected texture coordinates, found the line's end");
+                        return self.wrong(expected_at_line_end("texture coordinates"));
                     };
                     parsed.uvs.push(DVec2::new(u, v).as_vec2());
                 }
@@ -263,11 +302,11 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Adds the color that ends a line, for `times` vertices or corners.
-    fn color(&mut self, color: &[f64], times: usize, colors: &mut Colors) {
+    /// Adds the color at the end of a line for `times` vertices or corners.
+    fn color(&mut self, color: &[f64], times: usize, colors: &mut OffColors) {
         colors.push(color, times);
         match color {
-            [_, _, _, alpha] => colors.alpha(*alpha, self.cursor.at()),
+            [_, _, _, alpha] => colors.add_alpha(*alpha, self.cursor.at()),
             [_] => self.indices.add(self.cursor.at()),
             [] | [_, _, _] => {}
             [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.at()),
@@ -280,7 +319,7 @@ impl Reader<'_> {
 
     fn float(&mut self, what: &str) -> Result<f64, AssetError> {
         if !self.cursor.skip_in_line() {
-            return self.wrong(format!("expected {what}, found the line's end"));
+            return self.wrong(expected_at_line_end(what));
         }
         match self.cursor.float() {
             Some(value) => Ok(value),
@@ -288,7 +327,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads the numbers up to the line's end: a colour of any length, and texture coordinates.
+    /// Reads the remaining numbers of the line: a color of any length, and texture coordinates.
     fn rest_of_line(&mut self) -> Result<Vec<f64>, AssetError> {
         let mut rest = Vec::new();
         while self.cursor.skip_in_line() {
@@ -297,7 +336,7 @@ impl Reader<'_> {
         Ok(rest)
     }
 
-    /// Reads texture coordinates, which are the last of a line, behind a colour of any length.
+    /// Reads texture coordinates, the last two numbers of a line, after a color of any length.
     fn last_two(&mut self) -> Result<Vec2, AssetError> {
         let mut last = DVec2::new(self.float("u")?, self.float("v")?);
         while self.cursor.skip_in_line() {
@@ -306,36 +345,38 @@ impl Reader<'_> {
         Ok(last.as_vec2())
     }
 
-    fn faces(&mut self, vertices: u64, count: u64, parsed: &mut Parsed) -> Result<Colors, AssetError> {
+    fn faces(&mut self, vertices: u64, count: u64, parsed: &mut ParsedMesh) -> Result<OffColors, AssetError> {
         parsed.faces.reserve(count as usize);
-        let mut colors = Colors::default();
+        let mut colors = OffColors::default();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
             }
             if !self.cursor.skip_blank() {
-                return self.wrong(format!("the file ends after {index} of {count} faces"));
+                return self.wrong(truncated(index, count, "faces"));
             }
             self.face(vertices, parsed, &mut colors)?;
         }
         Ok(colors)
     }
 
-    fn face(&mut self, vertices: u64, parsed: &mut Parsed, colors: &mut Colors) -> Result<(), AssetError> {
+    fn face(
+        &mut self,
+        vertices: u64,
+        parsed: &mut ParsedMesh,
+        colors: &mut OffColors,
+    ) -> Result<(), AssetError> {
         let arity = usize::try_from(self.number("corners")?).unwrap_or(usize::MAX);
         if arity.saturating_mul(2) > self.cursor.remaining() {
-            return self.wrong(format!("a face claims {arity} corners, more than the file can hold"));
+            return self.wrong(too_many_corners(arity));
         }
         for corner in 0..arity {
             if !self.cursor.skip_in_line() && (corner == 0 || !self.cursor.skip_blank()) {
-                return self.wrong(format!("a face of {arity} corners ends after {corner}"));
+                return self.wrong(short_face(corner, arity));
             }
             match self.cursor.integer() {
                 Some(vertex) if (0..vertices as i64).contains(&vertex) => parsed.faces.corner(vertex as u32),
-                Some(vertex) => {
-                    return self
-                        .wrong(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
-                }
+                Some(vertex) => return self.wrong(vertex_out_of_range(vertex, vertices)),
                 None => return self.unexpected("a vertex"),
             }
         }
@@ -358,25 +399,26 @@ impl Reader<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assets::read::Watch;
+    use crate::assets::read::Monitor;
+    use crate::assets::rejection;
     use crate::control::{CancelToken, ignore_progress};
     use crate::math::Vec3;
     use std::path::Path;
 
     fn read(text: &str) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
-        let watch = Watch { progress: &ignore_progress, token: &token };
-        parse(&Source { path: Path::new("a.off"), bytes: text.as_bytes(), watch })
+        let monitor = Monitor { progress: &ignore_progress, token: &token };
+        parse(&MeshSource { path: Path::new("a.off"), bytes: text.as_bytes(), monitor })
     }
 
-    fn says(text: &str) -> String {
-        read(text).expect_err("refused").to_string()
+    fn error(text: &str) -> (Option<usize>, String) {
+        rejection(read(text))
     }
 
     const FACES: &str = "3 0 1 2\n3 0 2 3\n";
 
     #[test]
-    fn one_mesh_in_all_the_ways_it_occurs() {
+    fn all_notations_give_the_same_mesh() {
         let coordinates = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
         let lines = |tail: &str| coordinates.map(|line| format!("{line}{tail}\n")).concat();
         let plain = read(&format!("OFF\n4 2 0\n{}{FACES}", lines(""))).expect("plain").mesh;
@@ -407,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn declared_colours_are_read() {
+    fn declared_colors_are_read() {
         let read = |tails: [&str; 3]| {
             let [a, b, c] = tails;
             let text = format!("STCOFF\n3 1 0\n0 0 0 {a} 0 0\n1 0 0 {b} 1 0\n0 1 0 {c} 0 1\n3 0 1 2\n");
@@ -421,8 +463,8 @@ mod tests {
         assert_eq!(read(["3", "3", "3"]), [[0; 3]; 0]);
     }
 
-    /// Colors of the corners of two triangles, whose lines end in these tails, and the warnings.
-    fn of_faces(header: &str, vertex: &str, tails: [&str; 2]) -> (Vec<[u8; 3]>, Vec<String>) {
+    /// Corner colors of two triangles whose lines end in `tails`, and the warnings.
+    fn corner_colors(header: &str, vertex: &str, tails: [&str; 2]) -> (Vec<[u8; 3]>, Vec<String>) {
         let [a, b] = tails;
         let text = format!(
             "{header}\n4 2 0\n0 0 0{vertex}\n1 0 0{vertex}\n1 1 0{vertex}\n0 1 0{vertex}\n3 0 1 2 {a}\n3 0 2 3 {b}\n"
@@ -435,9 +477,9 @@ mod tests {
     }
 
     #[test]
-    fn colors_of_faces_are_read() {
+    fn face_colors_are_read() {
         let (red, green, white) = ([255, 0, 0], [0, 255, 0], [255; 3]);
-        let off = |tails| of_faces("OFF", "", tails);
+        let off = |tails| corner_colors("OFF", "", tails);
         let both = ([[red; 3], [green; 3]].concat(), vec![]);
         for tails in [
             ["255 0 0", "0 255 0"],
@@ -449,22 +491,20 @@ mod tests {
         }
         assert_eq!(off(["255 0 0", ""]), ([[red; 3], [white; 3]].concat(), vec![]));
         assert_eq!(off(["", ""]), (vec![], vec![]));
-        let index = "line 7 has an index into a colormap that is elsewhere: ignored";
-        assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index.to_owned()]));
-        let (colors, faded) = off(["1 0 0", "0 1 0 0.5"]);
-        assert_eq!((colors, faded.len()), ([[red; 3], [green; 3]].concat(), 1));
-        assert!(faded[0].starts_with("line 8: "), "{faded:?}");
-        let more = "line 7 and 1 more have more numbers than the header names: ignored";
-        assert_eq!(off(["1 2", "1 0 0 1 7"]), ([[white; 3], [red; 3]].concat(), vec![more.to_owned()]));
-        let vertices = "the colors of the faces are ignored: the vertices have colors";
+        let index = ignored_lines(7, 1, COLOR_INDEX);
+        assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index]));
+        let transparent = vec![alpha_ignored(8)];
+        assert_eq!(off(["1 0 0", "0 1 0 0.5"]), ([[red; 3], [green; 3]].concat(), transparent));
+        let more = ignored_lines(7, 2, UNDECLARED);
+        assert_eq!(off(["1 2", "1 0 0 1 7"]), ([[white; 3], [red; 3]].concat(), vec![more]));
         assert_eq!(
-            of_faces("COFF", " 0 255 0", ["255 0 0", "255 0 0"]),
-            (vec![green; 6], vec![vertices.to_owned()])
+            corner_colors("COFF", " 0 255 0", ["255 0 0", "255 0 0"]),
+            (vec![green; 6], vec![FACE_COLORS_IGNORED.to_owned()])
         );
     }
 
     #[test]
-    fn a_face_that_crosses_itself_has_a_line() {
+    fn self_intersections_are_reported_with_line() {
         let text = "OFF 4 3\n0 0 0\n3 0 0\n0 1 0\n3 2 0\n3 0 1 2 # x\n\n4 0 1 3\n2 255 0 0\n4 0 1 2 3\n";
         let warnings = read(text).expect("whole").warnings;
         assert_eq!(warnings.len(), 1);
@@ -472,15 +512,15 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_the_header_does_not_name_have_their_line() {
-        let more = "line 3 and 3 more have more numbers than the header names: ignored";
-        assert_eq!(of_faces("OFF", " 0 0 1", ["", ""]), (vec![], vec![more.to_owned()]));
-        assert_eq!(of_faces("NOFF", " 0 0 1 7", ["", ""]).1, [more.to_owned()]);
-        assert!(of_faces("NOFF", " 0 0 1", ["", ""]).1.is_empty());
+    fn undeclared_numbers_are_reported_with_line() {
+        let more = ignored_lines(3, 4, UNDECLARED);
+        assert_eq!(corner_colors("OFF", " 0 0 1", ["", ""]), (vec![], vec![more.clone()]));
+        assert_eq!(corner_colors("NOFF", " 0 0 1 7", ["", ""]).1, [more]);
+        assert!(corner_colors("NOFF", " 0 0 1", ["", ""]).1.is_empty());
     }
 
     #[test]
-    fn declared_normals_and_texture_coordinates_are_read() {
+    fn declared_normals_and_uvs_are_read() {
         let text = "STCNOFF\n3 1 0\n0 0 0 0 0 2 9 9 9 9 0.5 0.25\n1 0 0 0 0 2 9 9 9 1 0\n0 1 0 0 0 2 9 0 1\n3 0 1 2\n";
         let mesh = read(text).expect("whole").mesh;
         assert_eq!(mesh.normals, [Vec3::Z; 3]);
@@ -490,53 +530,49 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_line() {
+    fn errors_name_the_line_and_the_reason() {
         let start = "OFF\n# comment\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n";
-        assert!(says(&format!("{start}3 0 1 3\n")).starts_with("a.off:7: vertex 3 is out of range"));
-        assert!(says(&format!("{start}3 0 -1 2\n")).starts_with("a.off:7: vertex -1 is out of range"));
-        assert!(says(&format!("{start}3 0 1 x\n")).starts_with("a.off:7: expected a vertex, found \"x\""));
-        assert!(says(&format!("{start}3 0 1  \n\n")).contains("a face of 3 corners ends after 2"));
-        assert!(
-            says("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n").starts_with("a.off:4: expected a coordinate")
-        );
-        assert!(
-            says("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n")
-                .starts_with("a.off:4: expected a coordinate, found the")
-        );
-        assert!(says("OFF\n1 2 0\n0 0 0\n3 0 0 0\n      \n").contains("after 1 of 2 faces"));
-        assert!(says("").contains("empty"));
-        assert!(says("solid\n").starts_with("a.off:1: expected OFF, found \"solid\""));
-        assert!(says("nOFF 3\n").contains("no kind of OFF"));
-        assert!(says("OFF BINARY\n").contains("binary"));
-        for (text, reason) in [
-            ("OFF\n-1 2 0\n", "a.off:2: the number of vertices is -1"),
-            ("OFF -3 1 0\n", "a.off:1: the number of vertices is -3"),
-            ("OFF\n3 -1 0\n", "a.off:2: the number of faces is -1"),
-            ("OFF\n1.5 2 0\n", "a.off:2: expected the number of vertices, found \"1.5\""),
-            ("OFF\n3 x 0\n", "a.off:2: expected the number of faces, found \"x\""),
-            ("OFF 3\n", "a.off:1: the file ends before the number of faces"),
-            ("OFF", "a.off:1: the file ends before the number of vertices"),
-            ("OFF 3 1 0", "a.off:1: the header claims 3 vertices and 1 face, and the file ends behind it"),
-            ("OFF 3 1 x\n", "a.off:1: expected the number of edges, found \"x\""),
-            (
-                "OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2\n",
-                "a.off:1: expected the line's end behind the three counts, found \"0\"; each vertex and each face stands on a line of its own",
-            ),
+        let first_face = |face: &str| error(&format!("{start}{face}\n"));
+        for (face, reason) in [
+            ("3 0 1 3", vertex_out_of_range(3, 3)),
+            ("3 0 -1 2", vertex_out_of_range(-1, 3)),
+            ("3 0 1 x", expected("a vertex", b"x")),
+            ("-3 0 1 2", negative_count("corners", -3)),
+            ("x 0 1 2", expected(&number_of("corners"), b"x")),
         ] {
-            assert_eq!(says(text), reason);
+            assert_eq!(first_face(face), (Some(7), reason));
         }
-        assert_eq!(says(&format!("{start}-3 0 1 2\n")), "a.off:7: the number of corners is -3");
-        assert_eq!(
-            says(&format!("{start}x 0 1 2\n")),
-            "a.off:7: expected the number of corners, found \"x\""
-        );
+        assert_eq!(first_face("3 0 1  \n").1, short_face(2, 3));
+        for (text, line, reason) in [
+            ("OFF\n2 1 0\n0 0 0\n0 zero 0 0\n3 0 1 2\n", 4, expected("a coordinate", b"zero")),
+            ("OFF\n2 1 0\n0 0 0\n0 0\n30 0 1 2 3\n", 4, expected_at_line_end("a coordinate")),
+            ("OFF\n1 2 0\n0 0 0\n3 0 0 0\n      \n", 6, truncated(1, 2, "faces")),
+            ("", 1, EMPTY_FILE.to_owned()),
+            ("solid\n", 1, expected(NOT_OFF, b"solid")),
+            ("nOFF 3\n", 1, unsupported_variant(b"nOFF")),
+            ("OFF BINARY\n", 1, BINARY_OFF.to_owned()),
+            ("OFF\n-1 2 0\n", 2, negative_count("vertices", -1)),
+            ("OFF -3 1 0\n", 1, negative_count("vertices", -3)),
+            ("OFF\n3 -1 0\n", 2, negative_count("faces", -1)),
+            ("OFF\n1.5 2 0\n", 2, expected(&number_of("vertices"), b"1.5")),
+            ("OFF\n3 x 0\n", 2, expected(&number_of("faces"), b"x")),
+            ("OFF 3\n", 1, missing_count("faces")),
+            ("OFF", 1, missing_count("vertices")),
+            ("OFF 3 1 0", 1, implausible(3, 1, 0)),
+            ("OFF 3 1 x\n", 1, expected(&number_of("edges"), b"x")),
+            ("OFF 3 1 0 0 0 0 1 0 0 0 1 0 3 0 1 2\n", 1, counts_not_alone(b"0")),
+        ] {
+            assert_eq!(error(text), (Some(line), reason), "{text}");
+        }
     }
 
     #[test]
-    fn lies_cost_nothing() {
-        assert!(says("OFF\n4000000000 4000000000 0\n0 0 0\n").contains("only 6 bytes follow"));
-        assert!(says("OFF\n18446744073709551615 1 0\n").contains("number of vertices"));
+    fn false_counts_allocate_nothing() {
+        let huge = 4_000_000_000;
+        assert_eq!(error("OFF\n4000000000 4000000000 0\n0 0 0\n").1, implausible(huge, huge, 6));
+        let overflow = expected(&number_of("vertices"), b"18446744073709551615");
+        assert_eq!(error("OFF\n18446744073709551615 1 0\n").1, overflow);
         let text = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n";
-        assert!(says(text).starts_with("a.off:6: a face claims 4000000000 corners"));
+        assert_eq!(error(text), (Some(6), too_many_corners(4_000_000_000)));
     }
 }

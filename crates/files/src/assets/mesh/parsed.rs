@@ -1,30 +1,30 @@
-//! The numbers of a mesh file, as its parser found them.
+//! Unprocessed contents of a mesh file, as read by its parser.
 
 use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::places::shared;
+use super::coincident;
 use crate::assets::{Companion, FileMaterial};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Polygons over vertices: corners of all, one after the other.
+/// Polygons as vertex indices, concatenated.
 #[derive(Debug, Default)]
 pub(crate) struct Faces {
     pub(super) corners: Vec<u32>,
-    /// Corners of each face; empty as long as all are triangles.
+    /// Number of corners of each face. Empty while all faces are triangles.
     pub(super) arities: Vec<u32>,
 }
 
 impl Faces {
-    /// Adds a corner to the face that [`Faces::close`] will end.
+    /// Adds a corner to the current face, which [`Faces::close`] ends.
     pub(crate) fn corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
 
-    /// Ends a face of this many corners.
+    /// Ends the current face, which has `arity` corners.
     pub(crate) fn close(&mut self, arity: usize) {
         if self.arities.is_empty() && arity == 3 {
             return;
@@ -40,17 +40,17 @@ impl Faces {
         self.corners.reserve(3 * triangles);
     }
 
-    /// Gives corners at one place the same vertex, the first of them.
+    /// Replaces coincident vertices by the first of them.
     pub(super) fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
         let mut first: Vec<u32> = (0..positions.len() as u32).collect();
-        for place in shared(positions, token)? {
+        for place in coincident::find(positions, token)? {
             place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
         }
         self.corners.par_iter_mut().for_each(|corner| *corner = first[*corner as usize]);
         Ok(())
     }
 
-    /// Most corners that vertices of 32 bits can number.
+    /// Maximum number of corners: vertex indices have 32 bits.
     pub(crate) const MOST_CORNERS: usize = u32::MAX as usize;
 
     /// Number of faces.
@@ -59,24 +59,24 @@ impl Faces {
     }
 }
 
-/// A mesh file's numbers. `normals`, `normal_groups`, `uvs`, `second_uvs` and `colors` are empty or one for each position; a normal of zero is missing.
-/// `face_materials` is empty or one for each face.
+/// Contents of a mesh file. `normals`, `normal_groups`, `uvs`, `second_uvs` and `colors` are empty or have
+/// one entry per position; a zero normal is missing. `face_materials` is empty or has one entry per face.
 #[derive(Debug, Default)]
-pub(crate) struct Parsed {
+pub(crate) struct ParsedMesh {
     pub(crate) positions: Vec<DVec3>,
     pub(crate) normals: Vec<Vec3>,
     pub(crate) normal_groups: Vec<NormalGroup>,
     pub(crate) uvs: Vec<Vec2>,
     pub(crate) second_uvs: Vec<Vec2>,
-    /// In sRGB.
+    /// sRGB.
     pub(crate) colors: Vec<[u8; 3]>,
     pub(crate) faces: Faces,
-    /// Texture coordinates of each corner of the faces, NaN where it takes those of its vertex; or empty.
+    /// Texture coordinates of each face corner, or empty. NaN selects the vertex's coordinates.
     pub(crate) corner_uvs: Vec<Vec2>,
-    /// Color of each corner of the faces, or empty.
+    /// Color of each face corner, or empty.
     pub(crate) corner_colors: Vec<[u8; 3]>,
-    /// Whether each face has vertices of its own, of which those at one place become one.
-    pub(crate) has_corners_apart: bool,
+    /// Whether faces share no vertices, so that coincident ones must be joined.
+    pub(crate) has_separate_corners: bool,
     pub(crate) face_materials: Vec<u32>,
     pub(crate) materials: Vec<FileMaterial>,
     pub(crate) warnings: Vec<String>,
@@ -85,39 +85,50 @@ pub(crate) struct Parsed {
     pub(crate) pictures: Vec<PathBuf>,
 }
 
-/// The range of the colors of a file whose format does not say it: 0 to 1, or 0 to 255.
+/// Guesses whether colors range from 0 to 1 or from 0 to 255, for formats that do not specify it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ColorRange {
-    greatest: f64,
+    max: f64,
     has_fractions: bool,
 }
 
 impl ColorRange {
-    /// The greatest number.
-    pub(crate) fn greatest(&self) -> f64 {
-        self.greatest
+    /// The largest value so far.
+    pub(crate) fn max(&self) -> f64 {
+        self.max
     }
 
     pub(crate) fn add(&mut self, parts: [f64; 3]) {
         for part in parts.into_iter().filter(|part| part.is_finite()) {
-            self.greatest = self.greatest.max(part);
+            self.max = self.max.max(part);
             self.has_fractions |= part.fract() != 0.0;
         }
     }
 
-    /// The number that stands for 1. Fractions up to 2 are colors brighter than 1.
+    /// Value of full intensity. Fractional values up to 2 are taken as colors brighter than 1.
     pub(crate) fn one(&self) -> f64 {
-        let are_bytes = self.greatest > 2.0 || (self.greatest > 1.0 && !self.has_fractions);
+        let are_bytes = self.max > 2.0 || (self.max > 1.0 && !self.has_fractions);
         if are_bytes { 255.0 } else { 1.0 }
     }
 
-    /// A color of this range in bytes.
+    /// Converts a color of this range to bytes.
     pub(crate) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
         color_bytes(parts.map(|part| part / self.one()))
     }
 }
 
-/// A vertex color with parts from 0 to 1 in sRGB, in bytes; NaN is 0.
+/// Converts an sRGB color with components in [0, 1] to bytes. NaN becomes 0.
 pub(crate) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
+
+/// Warning about a color's alpha below 1.
+pub(super) const ALPHA_IGNORED: &str = "color alpha is ignored";
+
+/// [`ALPHA_IGNORED`] with a line.
+pub(super) fn alpha_ignored(line: usize) -> String {
+    format!("line {line}: {ALPHA_IGNORED}")
+}
+
+/// Warning about faces with colors whose vertices have colors as well.
+pub(super) const FACE_COLORS_IGNORED: &str = "face colors are ignored because the vertices have colors";

@@ -1,93 +1,92 @@
-//! STL: facets with their corners and nothing else, as text or binary (3D Systems, *StereoLithography Interface Specification*,
-//! 1989). Real files vary: binary headers that begin with "solid", counts that are too small, polygons, several solids, normals that are
-//! zero or wrong, keywords in any case. Normals are those of the corners' order; corners at one place become one vertex. The format
-//! has no unit and no colours.
+//! STL: facets given by their corners, as text or binary (3D Systems, *StereoLithography Interface
+//! Specification*, 1989). Many files deviate: binary headers that begin with "solid", counts that are too
+//! small, polygons, several solids, zero or wrong normals, keywords in any case. Normals follow from the
+//! order of the corners; coincident corners become one vertex. The format has no unit and no standard colors.
 
 use super::assemble::{assemble, assemble_text};
-use super::parsed::{Faces, Parsed};
-use super::text::{Cursor, shown, with_line_feeds};
-use super::{AssetError, LoadedMesh, Source};
+use super::parsed::{Faces, ParsedMesh};
+use super::text::{Cursor, expected, with_line_feeds};
+use super::{AssetError, LoadedMesh, MeshSource};
 use crate::assets::read;
 use crate::math::DVec3;
 
-/// Bytes before the number of facets of a binary file.
+/// Size of a binary file's header, before the number of facets.
 const HEADER: usize = 80;
-/// Bytes before the first facet.
+/// Offset of the first facet.
 const START: usize = HEADER + 4;
-/// Bytes of a facet: a normal and three corners of three floats each, and two bytes that programs fill as they like.
+/// Size of a facet: a normal and three corners of three floats each, and a two-byte attribute.
 const FACET: usize = 50;
-/// Facets, or words of a text, between two polls of the token.
+/// Facets of a binary file or words of a text file between two polls of the cancel token.
 const BATCH: usize = 1 << 13;
 
-pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
+pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     if !fits_claim(source.bytes) {
         read::refuse_utf16(source.path, source.bytes)?;
     }
-    match kind(source.bytes) {
-        Kind::Text => {
+    match encoding(source.bytes) {
+        StlEncoding::Text => {
             let bytes = with_line_feeds(source.bytes);
-            let source = Source { bytes: &bytes, ..*source };
-            let mut text = Text { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
-            let parsed = Parsed { has_corners_apart: true, ..text.read()? };
-            assemble_text(&source, parsed, |face| text.start_of(face))
+            let source = MeshSource { bytes: &bytes, ..*source };
+            let mut reader =
+                TextReader { source, cursor: Cursor::new(source.bytes, 0), polygons: Vec::new() };
+            let parsed = ParsedMesh { has_separate_corners: true, ..reader.read()? };
+            assemble_text(&source, parsed, |face| reader.start_of(face))
         }
-        Kind::Binary => assemble(source, Parsed { has_corners_apart: true, ..binary(source)? }),
+        StlEncoding::Binary => assemble(source, ParsedMesh { has_separate_corners: true, ..binary(source)? }),
     }
 }
 
-/// How a file is written.
-enum Kind {
+/// Encoding of a file.
+enum StlEncoding {
     Text,
     Binary,
 }
 
-/// The kind of a file. One whose length is that of the facets which it claims is binary, whatever its header says.
-fn kind(bytes: &[u8]) -> Kind {
+/// Detects the encoding. A file whose size matches its claimed number of facets is binary, whatever its
+/// header contains.
+fn encoding(bytes: &[u8]) -> StlEncoding {
     let word = bytes.trim_ascii_start().get(..5);
     let says_solid = word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
-    // Text has no byte 0; a header is filled with them, or with blanks before facets that have some.
+    // Text has no zero bytes. Binary headers are padded with zeros, or with blanks before facets that contain
+    // zeros.
     let is_text = says_solid && memchr::memchr(0, bytes).is_none();
-    if is_text && !fits_claim(bytes) { Kind::Text } else { Kind::Binary }
+    if is_text && !fits_claim(bytes) { StlEncoding::Text } else { StlEncoding::Binary }
 }
 
-/// Whether the length of a file is that of the facets which it claims as a binary file.
+/// Whether the file's size matches the number of facets that it would claim as a binary file.
 fn fits_claim(bytes: &[u8]) -> bool {
     claimed(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
 
-/// The number of facets that a binary file claims. `None` if it ends before.
+/// Number of facets that a binary file claims. `None` if the file is too short.
 fn claimed(bytes: &[u8]) -> Option<u64> {
     let count = bytes.get(HEADER..START)?.first_chunk()?;
     Some(u64::from(u32::from_le_bytes(*count)))
 }
 
 /// Reads a binary file.
-fn binary(source: &Source<'_>) -> Result<Parsed, AssetError> {
+fn binary(source: &MeshSource<'_>) -> Result<ParsedMesh, AssetError> {
     let Some(claimed) = claimed(source.bytes) else {
-        let start = shown(source.bytes.trim_ascii_start());
-        return Err(source.wrong(format!(
-            "an STL file is text that begins with solid, or binary of at least {START} bytes; found {start}"
-        )));
+        return Err(source.wrong(not_stl(source.bytes.trim_ascii_start())));
     };
     let facets = source.bytes[START..].chunks_exact(FACET);
-    let behind = facets.remainder().len();
+    let excess = facets.remainder().len();
     let found = facets.len() as u64;
     if found < claimed {
-        return Err(source
-            .wrong(format!("the header claims {claimed} facets, and the file ends after {found} of them")));
+        return Err(source.wrong(missing_facets(claimed, found)));
     }
     if found == 0 {
-        return Err(source
-            .wrong(format!("the header claims 0 facets, and {behind} bytes follow; a facet takes {FACET}")));
+        return Err(source.wrong(format!(
+                "the header claims 0 facets, and the {excess} bytes after it are less than a facet ({FACET} bytes)"
+            )));
     }
-    // A count of 0 is that of programs which do not know it yet when they begin to write.
+    // Accept a count of 0 from programs that write the header before they know the number of facets.
     let (count, mut warnings) = (if claimed == 0 { found } else { claimed }, Vec::new());
-    if claimed != 0 && (found > claimed || behind > 0) {
-        let bytes = (found - claimed) * FACET as u64 + behind as u64;
-        warnings
-            .push(format!("{bytes} bytes behind the {claimed} facets that the header claims are ignored"));
+    if claimed != 0 && (found > claimed || excess > 0) {
+        let bytes = (found - claimed) * FACET as u64 + excess as u64;
+        warnings.push(excess_bytes(bytes, claimed));
     }
-    let mut parsed = Parsed { warnings, ..Parsed::default() };
+    let mut parsed = ParsedMesh { warnings, ..ParsedMesh::default() };
     parsed.positions.reserve(3 * count as usize);
     for (index, facet) in facets.take(count as usize).enumerate() {
         if index % BATCH == 0 {
@@ -104,28 +103,50 @@ fn binary(source: &Source<'_>) -> Result<Parsed, AssetError> {
     Ok(parsed)
 }
 
-/// Adds a corner with a vertex of its own.
-fn add(parsed: &mut Parsed, position: DVec3) {
+fn not_stl(found: &[u8]) -> String {
+    let wanted = format!("text STL starting with solid, or binary STL of at least {START} bytes");
+    expected(&wanted, found)
+}
+
+fn missing_facets(claimed: u64, found: u64) -> String {
+    format!("the header claims {claimed} facets, but the file ends after {found}")
+}
+
+/// Warning about bytes after the last facet.
+fn excess_bytes(bytes: u64, claimed: u64) -> String {
+    format!("ignored {bytes} bytes after the {claimed} facets that the header declares")
+}
+
+const VERTEX_OUTSIDE: &str = "a vertex outside of \"outer loop\" and \"endloop\"";
+const ENDS_IN_FACET: &str = "the file ends inside a facet";
+const KEYWORD: &str = "an STL keyword";
+
+fn short_loop(corners: usize) -> String {
+    format!("a loop with only {corners} corners")
+}
+
+/// Adds a corner with its own vertex.
+fn add(parsed: &mut ParsedMesh, position: DVec3) {
     parsed.faces.corner(parsed.positions.len() as u32);
     parsed.positions.push(position);
 }
 
-/// Reads a text.
-struct Text<'a> {
-    source: Source<'a>,
+/// Reads a text file.
+struct TextReader<'a> {
+    source: MeshSource<'a>,
     cursor: Cursor<'a>,
-    /// Faces of more than 3 corners, and the offsets of their loops.
+    /// Faces with more than 3 corners, and the byte offsets of their loops.
     polygons: Vec<(usize, usize)>,
 }
 
-impl Text<'_> {
-    /// Offset of a face of more than 3 corners.
+impl TextReader<'_> {
+    /// Byte offset of the loop of a face with more than 3 corners.
     fn start_of(&self, face: usize) -> Option<usize> {
         self.polygons.iter().find(|(polygon, _)| *polygon == face).map(|(_, start)| *start)
     }
 
-    fn read(&mut self) -> Result<Parsed, AssetError> {
-        let mut parsed = Parsed::default();
+    fn read(&mut self) -> Result<ParsedMesh, AssetError> {
+        let mut parsed = ParsedMesh::default();
         let mut corners: Option<usize> = None;
         let (mut loop_start, mut faces) = (0, 0);
         let mut words = 0;
@@ -139,7 +160,7 @@ impl Text<'_> {
             let is = |name: &str| word.eq_ignore_ascii_case(name.as_bytes());
             if is("vertex") {
                 let Some(count) = &mut corners else {
-                    return self.wrong(start, "a vertex outside of \"outer loop\" and \"endloop\"");
+                    return self.wrong(start, VERTEX_OUTSIDE);
                 };
                 *count += 1;
                 let position = DVec3::new(self.float()?, self.float()?, self.float()?);
@@ -147,7 +168,7 @@ impl Text<'_> {
             } else if is("loop") {
                 loop_start = start.at();
                 if corners.replace(0).is_some() {
-                    return self.wrong(start, "a loop in a loop");
+                    return self.wrong(start, "a loop inside a loop");
                 }
             } else if is("endloop") {
                 match corners.take() {
@@ -158,22 +179,22 @@ impl Text<'_> {
                         faces += 1;
                         parsed.faces.close(count);
                     }
-                    Some(count) => return self.wrong(start, format!("a loop of {count} corners")),
+                    Some(count) => return self.wrong(start, short_loop(count)),
                     None => return self.wrong(start, "\"endloop\" without \"outer loop\""),
                 }
             } else if is("solid") || is("endsolid") {
-                self.name();
+                self.skip_name();
             } else if is("normal") {
                 self.skip_normal();
             } else if !(is("facet") || is("outer") || is("endfacet")) {
-                return self.wrong(start, format!("expected a keyword of STL, found {}", shown(word)));
+                return self.wrong(start, expected(KEYWORD, word));
             }
             if parsed.positions.len() > Faces::MOST_CORNERS {
                 return self.wrong(start, "more corners than a mesh can have; split it into several files");
             }
         }
         if corners.is_some() {
-            return self.wrong(self.cursor, "the file ends in a facet");
+            return self.wrong(self.cursor, ENDS_IN_FACET);
         }
         Ok(parsed)
     }
@@ -185,20 +206,17 @@ impl Text<'_> {
 
     fn float(&mut self) -> Result<f64, AssetError> {
         if !self.cursor.skip_blank() {
-            return self.wrong(self.cursor, "the file ends in a vertex");
+            return self.wrong(self.cursor, "the file ends inside a vertex");
         }
         let mut start = self.cursor;
         match self.cursor.float() {
             Some(value) => Ok(value),
-            None => {
-                let word = shown(start.word());
-                self.wrong(self.cursor, format!("expected a coordinate, found {word}"))
-            }
+            None => self.wrong(self.cursor, expected("a coordinate", start.word())),
         }
     }
 
-    /// Skips a name of any words, up to the end of the line or to the facet that follows it there.
-    fn name(&mut self) {
+    /// Skips a name of any number of words: up to the end of the line or a facet on the same line.
+    fn skip_name(&mut self) {
         let bytes = self.source.bytes;
         let is_blank = |byte: &u8| byte.is_ascii_whitespace();
         let mut at = self.cursor.at();
@@ -215,7 +233,7 @@ impl Text<'_> {
         self.cursor = Cursor::new(bytes, at);
     }
 
-    /// Skips a normal, whose words need not be numbers.
+    /// Skips a normal, which may contain words that are not numbers.
     fn skip_normal(&mut self) {
         for _ in 0..3 {
             let mut ahead = self.cursor;
@@ -229,25 +247,27 @@ impl Text<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assets::mesh::Watch;
+    use crate::assets::mesh::Monitor;
+    use crate::assets::mesh::assemble::NO_FACES;
+    use crate::assets::rejection;
     use crate::control::{CancelToken, ignore_progress};
     use crate::math::Vec3;
     use std::path::Path;
 
     fn read(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
-        parse(&Source {
+        parse(&MeshSource {
             path: Path::new("a.stl"),
             bytes,
-            watch: Watch { progress: &ignore_progress, token: &token },
+            monitor: Monitor { progress: &ignore_progress, token: &token },
         })
     }
 
-    fn says(bytes: &[u8]) -> String {
-        read(bytes).expect_err("refused").to_string()
+    fn error(bytes: &[u8]) -> (Option<usize>, String) {
+        rejection(read(bytes))
     }
 
-    /// The corners of a tetrahedron's facets, outwards.
+    /// Corners of a tetrahedron's facets, facing outwards.
     const TETRAHEDRON: [[[f32; 3]; 3]; 4] = {
         let [o, x, y, z] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         [[o, y, x], [o, x, z], [o, z, y], [x, y, z]]
@@ -277,7 +297,7 @@ mod tests {
         text + "endsolid of any name\n"
     }
 
-    /// The places of each triangle's corners.
+    /// Positions of each triangle's corners.
     fn places(loaded: &LoadedMesh) -> Vec<[Vec3; 3]> {
         let mesh = &loaded.mesh;
         (0..mesh.triangles.len() as u32)
@@ -286,10 +306,10 @@ mod tests {
     }
 
     #[test]
-    fn text_and_binary_give_the_same_facets_with_corners_joined() {
+    fn text_and_binary_give_the_same_joined_facets() {
         let expected = TETRAHEDRON.map(|facet| facet.map(Vec3::from_array));
         for bytes in [
-            binary_of(b"made by nobody", 4, &TETRAHEDRON),
+            binary_of(b"made by hand", 4, &TETRAHEDRON),
             binary_of(b"solid that is binary", 4, &TETRAHEDRON),
             binary_of(b"solid without its count", 0, &TETRAHEDRON),
             binary_of(b"s\0o\0l\0i\0d\0", 4, &TETRAHEDRON),
@@ -299,13 +319,13 @@ mod tests {
         ] {
             let loaded = read(&bytes).expect("read");
             assert_eq!(places(&loaded), expected);
-            assert_eq!(loaded.mesh.positions.len(), 4, "corners at one place are one vertex");
+            assert_eq!(loaded.mesh.positions.len(), 4, "coincident corners become one vertex");
             assert!(loaded.warnings.is_empty() && loaded.mesh.normals.is_empty());
         }
     }
 
     #[test]
-    fn blanks_may_be_of_any_kind() {
+    fn any_whitespace_separates_words() {
         let expected = TETRAHEDRON.map(|facet| facet.map(Vec3::from_array));
         let text = text_of(&TETRAHEDRON).replace("of # any name", "").replace("of any name", "");
         let words: Vec<&str> = text.split_whitespace().collect();
@@ -315,7 +335,7 @@ mod tests {
                 read(words.join(blank).as_bytes()).unwrap_or_else(|error| panic!("{error}: {blank:?}"));
             assert_eq!(places(&loaded), expected, "{blank:?}");
         }
-        assert_eq!(places(&read(twice.as_bytes()).expect("two solids in a line")).len(), 8);
+        assert_eq!(places(&read(twice.as_bytes()).expect("two solids on one line")).len(), 8);
         for name in ["one", "of two words", "a # b", "facet", "endsolid facet"] {
             let text = words.join(" ").replace("solid", &format!("solid {name}"));
             assert_eq!(places(&read(text.as_bytes()).expect(name)), expected, "{name:?}");
@@ -323,18 +343,18 @@ mod tests {
     }
 
     #[test]
-    fn places_that_differ_by_a_bit_are_apart() {
+    fn corners_that_differ_by_one_ulp_stay_separate() {
         let near = f32::from_bits(1.0_f32.to_bits() + 1);
         let facets = [
             [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             [[0.0, 0.0, -0.0], [near, 0.0, 0.0], [0.0, 0.0, 1.0]],
         ];
         let loaded = read(&binary_of(b"", 2, &facets)).expect("read");
-        assert_eq!(loaded.mesh.positions.len(), 5, "0 and -0 are one place");
+        assert_eq!(loaded.mesh.positions.len(), 5, "0 and -0 coincide");
     }
 
     #[test]
-    fn facets_without_area_are_left_out_and_counted() {
+    fn degenerate_facets_are_skipped_and_counted() {
         let mut facets = TETRAHEDRON.to_vec();
         facets.push([[0.0; 3], [1.0; 3], [1.0; 3]]);
         facets.push([[f32::NAN; 3], [1.0; 3], [0.0; 3]]);
@@ -346,14 +366,14 @@ mod tests {
     }
 
     #[test]
-    fn a_polygon_is_cut_and_solids_are_added() {
+    fn polygons_are_cut_and_solids_are_merged() {
         let square = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
         let loaded = read(format!("{square}{}", square.replace(" 0\n", " 3\n")).as_bytes()).expect("read");
         assert_eq!((loaded.mesh.triangles.len(), loaded.mesh.positions.len()), (4, 8));
     }
 
     #[test]
-    fn a_facet_that_crosses_itself_has_a_line() {
+    fn self_intersections_are_reported_with_line() {
         let facet = |corners: &[&str]| {
             let vertices: Vec<_> = corners.iter().map(|corner| format!("vertex {corner}\n")).collect();
             format!("facet normal 0 0 1\nouter loop\n{}endloop\nendfacet\n", vertices.concat())
@@ -369,40 +389,31 @@ mod tests {
     }
 
     #[test]
-    fn bytes_behind_the_facets_are_told() {
+    fn bytes_after_the_facets_give_a_warning() {
         let mut bytes = binary_of(b"", 3, &TETRAHEDRON);
         bytes.extend(b"rest");
         let loaded = read(&bytes).expect("read");
         assert_eq!(loaded.mesh.triangles.len(), 3);
-        assert_eq!(loaded.warnings, ["54 bytes behind the 3 facets that the header claims are ignored"]);
+        assert_eq!(loaded.warnings, [excess_bytes(54, 3)]);
     }
 
     #[test]
-    fn mistakes_have_their_place() {
+    fn errors_name_the_line_and_the_reason() {
         let cut = binary_of(b"", 9, &TETRAHEDRON);
-        assert_eq!(says(&cut), "a.stl: the header claims 9 facets, and the file ends after 4 of them");
-        assert_eq!(
-            says(&binary_of(b"", u32::MAX, &[])),
-            "a.stl: the header claims 4294967295 facets, and the file ends after 0 of them"
-        );
-        assert!(
-            says(b"PK\x03\x04 an archive").starts_with("a.stl: an STL file is text that begins with solid")
-        );
+        assert_eq!(error(&cut), (None, missing_facets(9, 4)));
+        assert_eq!(error(&binary_of(b"", u32::MAX, &[])).1, missing_facets(u64::from(u32::MAX), 0));
+        assert_eq!(error(b"PK\x03\x04 an archive").1, not_stl(b"PK\x03\x04 an archive"));
         let wide: Vec<u8> = "solid a\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-        assert_eq!(says(&wide), "a.stl:1: this is text in UTF-16; save it as UTF-8");
-        assert!(says(b"solid a\nendsolid a\n").contains("no usable face: the file has none"));
-        assert!(
-            says(b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n")
-                .starts_with("a.stl:4: expected a coordinate, found \"x\"")
-        );
-        assert!(
-            says(b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 1\n")
-                .starts_with("a.stl:4: the file ends in a facet")
-        );
-        assert!(says(b"solid\nvertex 0 0 1\n").starts_with("a.stl:2: a vertex outside"));
-        assert!(
-            says(b"solid\nouter loop\nvertex 0 0 1\nendloop\n").starts_with("a.stl:4: a loop of 1 corners")
-        );
-        assert!(says(b"solid\ncube 1\n").starts_with("a.stl:2: expected a keyword of STL, found \"cube\""));
+        assert_eq!(error(&wide), (Some(1), read::UTF16_TEXT.to_owned()));
+        assert_eq!(error(b"solid a\nendsolid a\n"), (None, NO_FACES.to_owned()));
+        for (text, line, reason) in [
+            ("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n", 4, expected("a coordinate", b"x")),
+            ("solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 1\n", 4, ENDS_IN_FACET.to_owned()),
+            ("solid\nvertex 0 0 1\n", 2, VERTEX_OUTSIDE.to_owned()),
+            ("solid\nouter loop\nvertex 0 0 1\nendloop\n", 4, short_loop(1)),
+            ("solid\ncube 1\n", 2, expected(KEYWORD, b"cube")),
+        ] {
+            assert_eq!(error(text.as_bytes()), (Some(line), reason), "{text}");
+        }
     }
 }

@@ -1,10 +1,10 @@
-//! Numbers from bytes: text files of numbers need no UTF-8 and no copies.
+//! Tokenizer for text files of numbers, on bytes: it needs neither UTF-8 nor copies.
 
 use std::borrow::Cow;
 
 use fast_float2::parse_partial;
 
-/// The text, with line feeds if its lines end in carriage returns alone, as on an old Macintosh.
+/// Replaces carriage returns by line feeds in a text without line feeds, as classic Mac OS wrote them.
 pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
     if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
         return Cow::Borrowed(bytes);
@@ -12,12 +12,12 @@ pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(bytes.iter().map(|byte| if *byte == b'\r' { b'\n' } else { *byte }).collect())
 }
 
-/// The text behind the byte order mark that some editors put before it.
+/// Strips a UTF-8 byte order mark.
 pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
 }
 
-/// A line as text: Latin-1 if it is not UTF-8, so that each byte is a letter and can be found again.
+/// Decodes a line as UTF-8, or as Latin-1 if it is not valid UTF-8, so that each byte maps to one character.
 pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(line) {
         Ok(text) => Cow::Borrowed(text),
@@ -25,7 +25,7 @@ pub(super) fn decoded(line: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// A place in a text.
+/// A position in a text.
 #[derive(Clone, Copy)]
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
@@ -37,7 +37,7 @@ impl<'a> Cursor<'a> {
         Self { bytes, at }
     }
 
-    /// Byte of the text.
+    /// Byte offset.
     pub(super) fn at(&self) -> usize {
         self.at
     }
@@ -46,7 +46,7 @@ impl<'a> Cursor<'a> {
         self.bytes.len() - self.at
     }
 
-    /// Goes to the next word, over line ends and comments. False at the end of the text.
+    /// Moves to the next word, skipping line ends and comments. Returns false at the end of the text.
     pub(super) fn skip_blank(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
@@ -58,7 +58,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Goes to the next word of this line. False at its end or at a comment.
+    /// Moves to the next word of this line. Returns false at the end of the line or at a comment.
     pub(super) fn skip_in_line(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
@@ -69,13 +69,13 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Goes behind the end of this line.
+    /// Moves past the end of this line.
     pub(super) fn end_line(&mut self) {
         let rest = &self.bytes[self.at..];
         self.at += rest.iter().position(|&byte| byte == b'\n').map_or(rest.len(), |end| end + 1);
     }
 
-    /// Takes the word that starts here.
+    /// Consumes the word that starts here.
     pub(super) fn word(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let length = rest.iter().position(|&byte| byte.is_ascii_whitespace() || byte == b'#');
@@ -84,13 +84,13 @@ impl<'a> Cursor<'a> {
         word
     }
 
-    /// Takes the number that starts here. Overflow is infinite; `nan` and `inf` are numbers.
+    /// Consumes the number that starts here. Overflow gives infinity; `nan` and `inf` are numbers.
     pub(super) fn float(&mut self) -> Option<f64> {
         let (value, length) = parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
-        self.past(length).then_some(value)
+        self.skip_number(length).then_some(value)
     }
 
-    /// Takes the whole number that starts here.
+    /// Consumes the integer that starts here.
     pub(super) fn integer(&mut self) -> Option<i64> {
         let rest = &self.bytes[self.at..];
         let negative = rest.first() == Some(&b'-');
@@ -103,12 +103,12 @@ impl<'a> Cursor<'a> {
             value = value.checked_mul(10)?.checked_add(i64::from(digit))?;
             length += 1;
         }
-        let whole = length > 0 && self.past(length + usize::from(negative));
+        let whole = length > 0 && self.skip_number(length + usize::from(negative));
         whole.then_some(if negative { -value } else { value })
     }
 
-    /// Goes past a number, if it ends there.
-    fn past(&mut self, length: usize) -> bool {
+    /// Moves past a number of `length` bytes if a word ends there.
+    fn skip_number(&mut self, length: usize) -> bool {
         let ends =
             self.bytes.get(self.at + length).is_none_or(|byte| byte.is_ascii_whitespace() || *byte == b'#');
         self.at += if ends { length } else { 0 };
@@ -116,9 +116,19 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Bytes from a file in a form to print: at most 20 of them, controls escaped.
+/// Formats the first 20 bytes of a word for a message, with control characters escaped.
 pub(super) fn shown(bytes: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&bytes[..bytes.len().min(20)]))
+}
+
+/// Reason to reject a word.
+pub(super) fn expected(wanted: &str, found: &[u8]) -> String {
+    format!("expected {wanted}, found {}", shown(found))
+}
+
+/// Reason to reject a line that ends too early.
+pub(super) fn expected_at_line_end(wanted: &str) -> String {
+    format!("expected {wanted}, found the end of the line")
 }
 
 #[cfg(test)]
@@ -126,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_lie_between_blanks_and_comments() {
+    fn blanks_and_comments_separate_words() {
         let mut cursor = Cursor::new(b" ab#c d\n\r\n # e\nf", 0);
         assert!(cursor.skip_blank());
         assert_eq!(cursor.word(), b"ab");
@@ -137,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn carriage_returns_end_lines_where_nothing_else_does() {
+    fn lone_carriage_returns_become_line_feeds() {
         assert_eq!(*with_line_feeds(b"a\rb\r"), *b"a\nb\n");
         for as_it_is in [b"a\r\nb\rc".as_slice(), b"a\nb", b"a", b""] {
             assert!(matches!(with_line_feeds(as_it_is), Cow::Borrowed(same) if same == as_it_is));
@@ -145,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_end_where_words_end() {
+    fn numbers_must_end_with_their_word() {
         let float = |text: &'static str| Cursor::new(text.as_bytes(), 0).float();
         assert_eq!(float("1.5e-3 "), Some(1.5e-3));
         assert_eq!(float("-.5#"), Some(-0.5));

@@ -1,12 +1,12 @@
-//! Decoded pixels of any kind → texels.
+//! Converts decoded pixels of any type to texels.
 
 mod cutout;
-mod numbers;
+mod scalars;
 
 use ::image::{ColorType, DynamicImage};
 
 use super::ImageEncoding;
-use super::facts::{Alpha, Facts};
+use super::metadata::{AlphaUsage, ImageMetadata};
 use super::space::ColorSpace;
 use crate::materials::PixelValue;
 use crate::materials::texels::{TexelData, Texels};
@@ -14,7 +14,7 @@ use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 use crate::math::limits::LARGEST;
 
-/// Gives the samples of an image of a known kind to an expression.
+/// Evaluates an expression with the samples of an image, for any sample type.
 macro_rules! with_samples {
     ($image:expr, $samples:ident => $body:expr) => {
         match $image {
@@ -28,7 +28,7 @@ macro_rules! with_samples {
             DynamicImage::ImageRgba16($samples) => $body,
             DynamicImage::ImageRgb32F($samples) => $body,
             DynamicImage::ImageRgba32F($samples) => $body,
-            // Kinds that a later `image` may add become this one.
+            // Formats that a later version of `image` may add.
             other => {
                 let $samples = &other.to_rgba32f();
                 $body
@@ -38,17 +38,17 @@ macro_rules! with_samples {
 }
 use with_samples;
 
-/// A sample of a file.
+/// Sample type of an image.
 trait Sample: Copy + PartialEq {
-    /// The sample, with 1 for the largest whole number.
+    /// The sample as a float. The largest integer becomes 1.
     fn unit(self) -> f32;
 
-    /// Linear values of whole numbers in this space. Floats are linear.
+    /// Linear values of all integers in this color space. `None` for floats, which are linear.
     fn tables(_: &ColorSpace) -> Option<[Vec<f32>; 3]> {
         None
     }
 
-    /// Place in a table of whole numbers.
+    /// Index of an integer in a table.
     fn index(self) -> usize {
         0
     }
@@ -88,63 +88,65 @@ impl Sample for f32 {
     }
 }
 
-/// Number of samples of a pixel, as [`with_samples`] gives them.
+/// Number of samples per pixel.
 fn channels(image: &DynamicImage) -> usize {
     usize::from(image.color().channel_count())
 }
 
-/// The place of alpha among the samples of a pixel. `None` without alpha.
-fn alpha(image: &DynamicImage, facts: &Facts) -> Option<usize> {
-    let place = match channels(image) {
+/// Index of the alpha sample, if the image has alpha.
+fn alpha(image: &DynamicImage, metadata: &ImageMetadata) -> Option<usize> {
+    let index = match channels(image) {
         2 => 1,
         4 => 3,
         _ => return None,
     };
-    match facts.alpha {
-        Alpha::Straight | Alpha::Premultiplied => Some(place),
-        Alpha::Unused => None,
-        Alpha::Unsure => (!is_everywhere(image, place, 0.0)).then_some(place),
+    match metadata.alpha {
+        AlphaUsage::Straight | AlphaUsage::Premultiplied => Some(index),
+        AlphaUsage::Unused => None,
+        AlphaUsage::UnusedIfZero => (!is_everywhere(image, index, 0.0)).then_some(index),
     }
 }
 
 /// Whether a sample has this value in all pixels.
-fn is_everywhere(image: &DynamicImage, place: usize, value: f32) -> bool {
-    fn all<T: Sample>(samples: &[T], (channels, place): (usize, usize), value: f32) -> bool {
-        samples.chunks_exact(channels).all(|pixel| pixel[place].unit() == value)
+fn is_everywhere(image: &DynamicImage, index: usize, value: f32) -> bool {
+    fn all<T: Sample>(samples: &[T], (channels, index): (usize, usize), value: f32) -> bool {
+        samples.chunks_exact(channels).all(|pixel| pixel[index].unit() == value)
     }
-    with_samples!(image, samples => all(samples, (channels(image), place), value))
+    with_samples!(image, samples => all(samples, (channels(image), index), value))
 }
 
-/// A warning about the alpha that an opacity is taken from, if it is the same in all pixels.
+/// Warning about an alpha channel that is used as opacity but is constant.
 pub(super) fn constant_alpha(
     image: &DynamicImage,
     encoding: ImageEncoding,
-    facts: &Facts,
+    metadata: &ImageMetadata,
 ) -> Option<&'static str> {
     let ImageEncoding::Number { of: PixelValue::Opacity | PixelValue::Mask { .. }, .. } = encoding else {
         return None;
     };
-    let alpha = alpha(image, facts)?;
+    let alpha = alpha(image, metadata)?;
     if is_everywhere(image, alpha, 0.0) {
-        return Some("its alpha is 0 everywhere: the surface is invisible");
+        return Some(INVISIBLE);
     }
     match encoding {
         ImageEncoding::Number { of: PixelValue::Mask { of_any_color }, .. }
             if is_everywhere(image, alpha, 1.0) =>
         {
-            Some(if numbers::is_gray_mask(image, of_any_color) {
-                "its alpha is 1 everywhere: its luminance is the opacity"
-            } else {
-                "its alpha is 1 everywhere: the surface is opaque; `channel` takes the opacity from a color"
-            })
+            Some(if scalars::is_gray_mask(image, of_any_color) { LUMINANCE_USED } else { OPAQUE })
         }
         _ => None,
     }
 }
 
-/// Texels of an image.
-pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, facts: &Facts) -> Texels {
-    // Kinds that a later `image` may add.
+/// Warnings about constant alpha.
+pub(super) const INVISIBLE: &str = "alpha is 0 everywhere; the surface is invisible";
+pub(super) const LUMINANCE_USED: &str = "alpha is 1 everywhere; luminance is used as the opacity";
+pub(super) const OPAQUE: &str =
+    "alpha is 1 everywhere, so the surface is opaque; `channel` selects a color as the opacity";
+
+/// Converts an image to texels.
+pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, metadata: &ImageMetadata) -> Texels {
+    // Convert formats that a later version of `image` may add.
     let image = match image.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => image,
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => image,
@@ -152,15 +154,15 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, facts: &Facts
         _ => image.into_rgba32f().into(),
     };
     match encoding {
-        ImageEncoding::Number { of, is_srgb } => return numbers::texels(&image, (of, is_srgb), facts),
-        ImageEncoding::CutOut(curve) => return cutout::texels(image, curve, facts),
+        ImageEncoding::Number { of, is_srgb } => return scalars::texels(&image, (of, is_srgb), metadata),
+        ImageEncoding::CutOut(curve) => return cutout::texels(image, curve, metadata),
         ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Linear | ImageEncoding::Raw => {}
     }
     let (width, height) = (image.width(), image.height());
     let channels = channels(&image);
     let mut unusable = 0;
-    if !encoding.space(facts).is_usual() {
-        let data = converted(&image, encoding, facts, &mut unusable);
+    if !encoding.space(metadata).is_default() {
+        let data = converted(&image, encoding, metadata, &mut unusable);
         return Texels { width, height, data, unusable };
     }
     let data = match image {
@@ -174,13 +176,13 @@ pub(super) fn texels(image: DynamicImage, encoding: ImageEncoding, facts: &Facts
         DynamicImage::ImageRgba16(pixels) => words(&pixels, channels, encoding),
         DynamicImage::ImageRgb32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
         DynamicImage::ImageRgba32F(pixels) => floats(&pixels, channels, encoding, &mut unusable),
-        // Kinds that a later `image` may add.
+        // Formats that a later version of `image` may add.
         other => floats(&other.into_rgb32f(), 3, encoding, &mut unusable),
     };
     Texels { width, height, data, unusable }
 }
 
-/// Red, green and blue of a pixel of 1 (grey), 2 (grey, alpha), 3 or 4 samples.
+/// Red, green and blue of a pixel of 1 (gray), 2 (gray, alpha), 3 or 4 samples.
 fn rgb<T: Copy>(pixel: &[T]) -> [T; 3] {
     match *pixel {
         [red, green, blue, ..] => [red, green, blue],
@@ -227,8 +229,14 @@ fn floats(samples: &[f32], channels: usize, encoding: ImageEncoding, unusable: &
     TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
 }
 
-/// Colors of another space than the usual one. Those beyond Rec. 709 are clipped, but for [`ImageEncoding::Raw`].
-fn converted(image: &DynamicImage, encoding: ImageEncoding, facts: &Facts, unusable: &mut u64) -> TexelData {
+/// Converts colors of a nonstandard color space. Colors outside Rec. 709 are clipped, except for
+/// [`ImageEncoding::Raw`].
+fn converted(
+    image: &DynamicImage,
+    encoding: ImageEncoding,
+    metadata: &ImageMetadata,
+    unusable: &mut u64,
+) -> TexelData {
     fn each<T: Sample>(
         samples: &[T],
         channels: usize,
@@ -247,12 +255,12 @@ fn converted(image: &DynamicImage, encoding: ImageEncoding, facts: &Facts, unusa
         };
         TexelData::Float(samples.chunks_exact(channels).map(&mut texel).collect())
     }
-    let space = encoding.space(facts);
-    let how = (&space, encoding == ImageEncoding::Raw);
-    with_samples!(image, samples => each(samples, channels(image), how, unusable))
+    let space = encoding.space(metadata);
+    let options = (&space, encoding == ImageEncoding::Raw);
+    with_samples!(image, samples => each(samples, channels(image), options, unusable))
 }
 
-/// Linear light of a pixel, by tables for whole numbers.
+/// Linearizes a pixel, using tables for integers.
 fn linear<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
     let rgb = rgb(pixel);
     match tables {
@@ -261,7 +269,7 @@ fn linear<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
     }
 }
 
-/// A value that light can have; the others become 0.
+/// Clamps negative values and replaces NaN, infinity and too large values by 0.
 fn clean(value: f32) -> f32 {
     if (0.0..=LARGEST as f32).contains(&value) { value } else { 0.0 }
 }

@@ -1,68 +1,70 @@
-//! The channels of an EXR that make its colors.
+//! Selects the color channels of an EXR file.
 
 use std::collections::BTreeMap;
 
 use ::exr::meta::header::Header;
 
-/// A channel of a part, both by their indices.
+/// A channel, by the index of its part and its index within the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Channel {
+pub(super) struct ChannelIndex {
     pub(super) part: usize,
     pub(super) channel: usize,
 }
 
-/// Channels to read.
+/// Channels to decode.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Chosen {
-    pub(super) color: Color,
-    pub(super) alpha: Option<Channel>,
+pub(super) struct ChosenChannels {
+    pub(super) color: ColorChannels,
+    pub(super) alpha: Option<ChannelIndex>,
 }
 
-/// Channels of a color.
+/// Channels that make up a color.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Color {
-    Rgb([Channel; 3]),
-    Gray(Channel),
+pub(super) enum ColorChannels {
+    Rgb([ChannelIndex; 3]),
+    Gray(ChannelIndex),
     /// Y, and the differences RY = (R − Y)/Y and BY = (B − Y)/Y.
-    LuminanceChroma(Channel, [Channel; 2]),
+    LuminanceChroma(ChannelIndex, [ChannelIndex; 2]),
 }
 
-impl Chosen {
-    /// Slots of a pixel with their channels: red, green, blue, alpha. Chroma has no slot.
-    pub(super) fn slots(self) -> [Option<Channel>; 4] {
+impl ChosenChannels {
+    /// Channel of each slot of a pixel: red, green, blue, alpha. Chroma has no slot.
+    pub(super) fn slots(self) -> [Option<ChannelIndex>; 4] {
         match self.color {
-            Color::Rgb([red, green, blue]) => [Some(red), Some(green), Some(blue), self.alpha],
-            Color::Gray(y) | Color::LuminanceChroma(y, _) => [Some(y), Some(y), Some(y), self.alpha],
+            ColorChannels::Rgb([red, green, blue]) => [Some(red), Some(green), Some(blue), self.alpha],
+            ColorChannels::Gray(y) | ColorChannels::LuminanceChroma(y, _) => {
+                [Some(y), Some(y), Some(y), self.alpha]
+            }
         }
     }
 
     /// Y, RY and BY.
-    pub(super) fn planes(self) -> Option<[Channel; 3]> {
+    pub(super) fn planes(self) -> Option<[ChannelIndex; 3]> {
         match self.color {
-            Color::Rgb(_) | Color::Gray(_) => None,
-            Color::LuminanceChroma(y, [ry, by]) => Some([y, ry, by]),
+            ColorChannels::Rgb(_) | ColorChannels::Gray(_) => None,
+            ColorChannels::LuminanceChroma(y, [ry, by]) => Some([y, ry, by]),
         }
     }
 
-    /// All channels.
-    pub(super) fn all(self) -> impl Iterator<Item = Channel> {
+    /// All channels to decode.
+    pub(super) fn all(self) -> impl Iterator<Item = ChannelIndex> {
         self.slots().into_iter().flatten().chain(self.planes().into_iter().flatten())
     }
 }
 
-/// The channels of a layer that have known names, in any case.
+/// Channels of a layer with known names, ignoring case.
 #[derive(Clone, Copy, Default)]
-struct Layer {
-    rgb: [Option<Channel>; 3],
-    luminance: Option<Channel>,
-    chroma: [Option<Channel>; 2],
-    alpha: Option<Channel>,
-    /// Whether it has an X: its Y is a coordinate.
+struct LayerChannels {
+    rgb: [Option<ChannelIndex>; 3],
+    luminance: Option<ChannelIndex>,
+    chroma: [Option<ChannelIndex>; 2],
+    alpha: Option<ChannelIndex>,
+    /// Whether the layer has a channel X, which means that Y is a coordinate.
     has_x: bool,
 }
 
-impl Layer {
-    fn add(&mut self, name: &str, channel: Channel) {
+impl LayerChannels {
+    fn add(&mut self, name: &str, channel: ChannelIndex) {
         let slot = match name.to_ascii_uppercase().as_str() {
             "R" => &mut self.rgb[0],
             "G" => &mut self.rgb[1],
@@ -80,101 +82,108 @@ impl Layer {
         slot.get_or_insert(channel);
     }
 
-    fn color(&self) -> Option<Chosen> {
+    fn color(&self) -> Option<ChosenChannels> {
         let [red, green, blue] = self.rgb;
-        Some(Chosen { color: Color::Rgb([red?, green?, blue?]), alpha: self.alpha })
+        Some(ChosenChannels { color: ColorChannels::Rgb([red?, green?, blue?]), alpha: self.alpha })
     }
 
-    fn gray(&self) -> Option<Chosen> {
+    fn gray(&self) -> Option<ChosenChannels> {
         let luminance = self.luminance.filter(|_| !self.has_x)?;
         let color = match self.chroma {
-            [Some(ry), Some(by)] => Color::LuminanceChroma(luminance, [ry, by]),
-            [None, None] => Color::Gray(luminance),
+            [Some(ry), Some(by)] => ColorChannels::LuminanceChroma(luminance, [ry, by]),
+            [None, None] => ColorChannels::Gray(luminance),
             [Some(_), None] | [None, Some(_)] => return None,
         };
-        Some(Chosen { color, alpha: self.alpha })
+        Some(ChosenChannels { color, alpha: self.alpha })
     }
 }
 
-type Layers = BTreeMap<String, Layer>;
+type LayerMap = BTreeMap<String, LayerChannels>;
 
-/// The channels to read. Colors come before gray, channels without a layer's name before those with one, channels of one part before
-/// channels of several, then the first; otherwise the only channel of a part, whatever its name.
-pub(super) fn choose(headers: &[Header]) -> Option<Chosen> {
-    let mut parts: Vec<Layers> =
+/// Selects the channels. Colors are preferred to gray, channels without a layer name to those with one,
+/// channels of a single part to those of several, then earlier ones to later ones. The last resort is the
+/// only channel of a part, with any name.
+pub(super) fn choose(headers: &[Header]) -> Option<ChosenChannels> {
+    let mut parts: Vec<LayerMap> =
         headers.iter().enumerate().map(|(part, header)| layers(part, header)).collect();
-    let joined = across_parts(headers);
-    // The Y of a part may belong to an X of another.
+    let across = across_parts(headers);
+    // The X that belongs to a Y may be in another part.
     for layers in &mut parts {
         for (name, layer) in layers {
-            layer.has_x |= joined.get(name).is_some_and(|joined| joined.has_x);
+            layer.has_x |= across.get(name).is_some_and(|across| across.has_x);
         }
     }
-    parts.push(joined);
-    let find = |is_named: bool, channels: fn(&Layer) -> Option<Chosen>| {
+    parts.push(across);
+    let find = |is_named: bool, channels: fn(&LayerChannels) -> Option<ChosenChannels>| {
         parts.iter().find_map(|layers| {
             let mut layers = layers.iter().filter(|(name, _)| name.is_empty() != is_named);
             layers.find_map(|(_, layer)| channels(layer))
         })
     };
-    let unnamed = find(false, Layer::color).or_else(|| find(false, Layer::gray));
-    let named = || find(true, Layer::color).or_else(|| find(true, Layer::gray));
-    unnamed.or_else(named).or_else(|| only(headers))
+    let unnamed = find(false, LayerChannels::color).or_else(|| find(false, LayerChannels::gray));
+    let named = || find(true, LayerChannels::color).or_else(|| find(true, LayerChannels::gray));
+    unnamed.or_else(named).or_else(|| sole_channel(headers))
 }
 
-/// Layers of a part by name; the name is before the last dot of the channels' names.
-fn layers(part: usize, header: &Header) -> Layers {
-    let mut layers = Layers::new();
+/// Layers of a part by name, which precedes the last dot of the channel names.
+fn layers(part: usize, header: &Header) -> LayerMap {
+    let mut layers = LayerMap::new();
     if !header.deep {
         add_channels(part, header, &mut layers);
     }
     layers
 }
 
-fn add_channels(part: usize, header: &Header, layers: &mut Layers) {
+fn add_channels(part: usize, header: &Header, layers: &mut LayerMap) {
     for (channel, description) in header.channels.list.iter().enumerate() {
         let name = description.name.to_string();
         let (layer, name) = name.rsplit_once('.').unwrap_or(("", &name));
-        layers.entry(layer.to_owned()).or_default().add(name, Channel { part, channel });
+        layers.entry(layer.to_owned()).or_default().add(name, ChannelIndex { part, channel });
     }
 }
 
-/// Layers of the parts that have one channel each.
-fn across_parts(headers: &[Header]) -> Layers {
-    let mut layers = Layers::new();
-    for (part, header) in single(headers) {
+/// Layers formed by the parts with a single channel.
+fn across_parts(headers: &[Header]) -> LayerMap {
+    let mut layers = LayerMap::new();
+    for (part, header) in single_channel_parts(headers) {
         add_channels(part, header, &mut layers);
     }
     layers
 }
 
-/// Flat parts of one channel.
-fn single(headers: &[Header]) -> impl Iterator<Item = (usize, &Header)> {
+/// Flat parts with a single channel.
+fn single_channel_parts(headers: &[Header]) -> impl Iterator<Item = (usize, &Header)> {
     let headers = headers.iter().enumerate();
     headers.filter(|(_, header)| !header.deep && header.channels.list.len() == 1)
 }
 
-/// The first part of one channel, unless that is a component of a color or a vector.
-fn only(headers: &[Header]) -> Option<Chosen> {
+/// The first part with a single channel, unless that is a component of a color or a vector.
+fn sole_channel(headers: &[Header]) -> Option<ChosenChannels> {
     const COMPONENTS: [&str; 7] = ["R", "G", "B", "RY", "BY", "X", "Y"];
     let is_component = |header: &Header| {
         let name = header.channels.list[0].name.to_string().to_ascii_uppercase();
         COMPONENTS.contains(&name.rsplit('.').next().unwrap_or_default())
     };
-    let is_vector = headers.len() > 1 && single(headers).any(|(_, header)| is_component(header));
-    let (part, _) = single(headers).find(|_| !is_vector)?;
-    Some(Chosen { color: Color::Gray(Channel { part, channel: 0 }), alpha: None })
+    let is_vector =
+        headers.len() > 1 && single_channel_parts(headers).any(|(_, header)| is_component(header));
+    let (part, _) = single_channel_parts(headers).find(|_| !is_vector)?;
+    Some(ChosenChannels { color: ColorChannels::Gray(ChannelIndex { part, channel: 0 }), alpha: None })
 }
 
-/// The reason why no channels can be chosen.
+/// Reason why no channels can be selected.
 pub(super) fn no_color(headers: &[Header]) -> String {
-    const MOST_NAMES: usize = 8;
+    const MAX_NAMES: usize = 8;
     if headers.iter().all(|header| header.deep) {
-        return "deep images are not read; flatten it".to_owned();
+        return "deep images are not supported; flatten the image".to_owned();
     }
     let flat = headers.iter().filter(|header| !header.deep);
     let mut names = flat.flat_map(|header| &header.channels.list).map(|channel| channel.name.to_string());
-    let some: Vec<_> = names.by_ref().take(MOST_NAMES).collect();
+    let shown: Vec<_> = names.by_ref().take(MAX_NAMES).collect();
     let more = if names.next().is_some() { ", …" } else { "" };
-    format!("its channels are {}{more}; wanted are R, G and B, or Y for grey", some.join(", "))
+    no_usable_channels(&format!("{}{more}", shown.join(", ")))
+}
+
+/// Reason to reject an image with only these channels.
+pub(in crate::assets::image) fn no_usable_channels(names: &str) -> String {
+    format!("no usable channels among {names}; expected R, G and B, or Y for gray")
 }

@@ -1,61 +1,63 @@
-//! Luminance and chroma → red, green and blue, as OpenEXR's `RgbaInputFile` converts them (Kainz and Bogart, *Technical
-//! Introduction to OpenEXR*, "Luminance/Chroma Images").
+//! Converts luminance and chroma to red, green and blue like OpenEXR's `RgbaInputFile` (Kainz and Bogart,
+//! *Technical Introduction to OpenEXR*, "Luminance/Chroma Images").
 
 use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
 
-use super::channels::Channel;
-use super::{Line, SAMPLE_BYTES, description};
+use super::channels::ChannelIndex;
+use super::{ChannelRow, SAMPLE_BYTES, description};
 use crate::math::DVec3;
 
-/// Weights of the samples on either side of a pixel without one, the nearest first (`ImfRgbaYca.cpp`).
+/// Interpolation weights of the samples on either side of a pixel, from nearest to farthest (`ImfRgbaYca.cpp`).
 const WEIGHTS: [f32; 7] = [0.627_123, -0.186_077, 0.087_929, -0.043_159, 0.019_597, -0.007_540, 0.002_128];
 
-/// Planes of luminance and chroma, in the data window.
-pub(super) struct Planes {
+/// Planes of luminance and chroma, covering the data window.
+pub(super) struct LuminanceChroma {
     /// Y, RY and BY.
-    channels: [Channel; 3],
-    /// Columns and rows.
+    channels: [ChannelIndex; 3],
+    /// Size of the luminance plane.
     size: Vec2<usize>,
-    /// Steps between samples of chroma.
+    /// Distance between chroma samples in pixels.
     step: Vec2<usize>,
     luminance: Vec<f32>,
     chroma: [Vec<f32>; 2],
 }
 
-impl Planes {
-    pub(super) fn new(headers: &[Header], channels: [Channel; 3]) -> Self {
+impl LuminanceChroma {
+    pub(super) fn new(headers: &[Header], channels: [ChannelIndex; 3]) -> Self {
         let [_, ry, _] = channels;
         let (size, step) = (headers[ry.part].layer_size, description(headers, ry).sampling);
         let chroma = || vec![0.0; (size / step).area()];
         Self { channels, size, step, luminance: vec![0.0; size.area()], chroma: [chroma(), chroma()] }
     }
 
-    /// Bytes of luminance, and of chroma in every column of the rows that have some.
-    pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [Channel; 3]) -> u64 {
+    /// Memory of the planes after chroma is interpolated along rows.
+    pub(super) fn memory_bytes(headers: &[Header], [_, ry, _]: [ChannelIndex; 3]) -> u64 {
         let size = headers[ry.part].layer_size;
         let rows = size.height() / description(headers, ry).sampling.y();
         let samples = (size.width() as u64).saturating_mul((size.height() + 2 * rows) as u64);
         samples.saturating_mul(SAMPLE_BYTES as u64)
     }
 
-    /// Adds a row of samples, if it is of one of the planes.
-    pub(super) fn add(&mut self, channel: Channel, row: usize, line: Line<'_>) {
+    /// Adds a row of samples if it belongs to one of the planes.
+    pub(super) fn add(&mut self, channel: ChannelIndex, row: usize, line: ChannelRow<'_>) {
         let widths = [self.size, self.size / self.step, self.size / self.step].map(|size| size.width());
         let [ry, by] = &mut self.chroma;
-        for ((plane, width), own) in [&mut self.luminance, ry, by].into_iter().zip(widths).zip(self.channels)
+        for ((plane, width), plane_channel) in
+            [&mut self.luminance, ry, by].into_iter().zip(widths).zip(self.channels)
         {
-            if let Some(row) = plane.chunks_exact_mut(width).nth(row).filter(|_| own == channel) {
-                line.values(0, row.iter_mut(), |place, value| *place = value);
+            if let Some(row) = plane.chunks_exact_mut(width).nth(row).filter(|_| plane_channel == channel) {
+                line.values(0, row.iter_mut(), |target, value| *target = value);
             }
         }
     }
 
-    /// Passes each pixel's column, row and color on. `weights` are those of red, green and blue in the luminance.
+    /// Calls `put` with the column, row and color of each pixel. `weights` are the luminance weights of red, green and
+    /// blue.
     pub(super) fn colors(mut self, weights: DVec3, mut put: impl FnMut([usize; 2], [f32; 3])) {
         let (width, height) = (self.size.width(), self.size.height());
         let is_filtered = self.step == Vec2(2, 2);
-        self.widen();
+        self.interpolate_rows();
         if !is_filtered {
             for (index, luminance) in self.luminance.iter().enumerate() {
                 let at = [index % width, index / width];
@@ -73,18 +75,18 @@ impl Planes {
         }
     }
 
-    /// Gives chroma a value in every column of the rows that have samples.
-    fn widen(&mut self) {
+    /// Interpolates chroma along the rows that have samples.
+    fn interpolate_rows(&mut self) {
         let (width, step) = (self.size.width(), self.step.x());
-        let widened = |plane: &Vec<f32>| -> Vec<f32> {
+        let interpolated = |plane: &Vec<f32>| -> Vec<f32> {
             let rows = plane.chunks_exact(width / step);
-            rows.flat_map(|row| (0..width).map(|x| between(x, self.step, row.len(), |at| row[at]))).collect()
+            rows.flat_map(|row| (0..width).map(|x| in_row(x, self.step, row.len(), |at| row[at]))).collect()
         };
-        let chroma = [widened(&self.chroma[0]), widened(&self.chroma[1])];
+        let chroma = [interpolated(&self.chroma[0]), interpolated(&self.chroma[1])];
         self.chroma = chroma;
     }
 
-    /// The colors of a row; the rows beyond the edges continue those within.
+    /// Colors of a row. Rows outside the image repeat those inside.
     fn row(&self, y: i64, weights: DVec3) -> Vec<[f32; 3]> {
         let (width, height) = (self.size.width(), self.size.height() as i64);
         let inside = if y >= height { height - 2 } else { y.max(0) } as usize;
@@ -101,15 +103,15 @@ impl Planes {
         (0..width).map(color).collect()
     }
 
-    /// Chroma of a pixel, linear between rows that have samples.
+    /// Chroma of a pixel, interpolated linearly between rows that have samples.
     fn interpolated(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let (width, rows) = (self.size.width(), self.size.height() / self.step.y());
         [0, 1].map(|plane| linear(y, self.step.y(), rows, |row| self.chroma[plane][row * width + x]))
     }
 }
 
-/// Chroma of a column: filtered where every second pixel of both directions has a sample, otherwise linear.
-fn between(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
+/// Interpolates chroma at a column: with the filter for 2 × 2 subsampling, otherwise linearly.
+fn in_row(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     if step != Vec2(2, 2) {
         return linear(x, step.x(), count, sample);
     }
@@ -120,20 +122,20 @@ fn between(x: usize, step: Vec2<usize>, count: usize, sample: impl Fn(usize) -> 
     }
 }
 
-/// The value between the samples `left` and `left + 1`.
+/// Filtered value between the samples `left` and `left + 1`.
 fn filtered(left: i64, sample: impl Fn(i64) -> f32) -> f32 {
     let pairs = (0..).zip(WEIGHTS);
     pairs.map(|(away, weight)| weight * (sample(left - away) + sample(left + 1 + away))).sum()
 }
 
-/// The value of a pixel between samples `step` pixels apart; behind the last one, its value continues.
+/// Interpolates linearly between samples with a distance of `step` pixels. The last sample is repeated.
 fn linear(pixel: usize, step: usize, count: usize, sample: impl Fn(usize) -> f32) -> f32 {
     let first = (pixel / step).min(count - 1);
-    let (low, part) = (sample(first), (pixel % step) as f32 / step as f32);
-    if part == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * part }
+    let (low, fraction) = (sample(first), (pixel % step) as f32 / step as f32);
+    if fraction == 0.0 { low } else { low + (sample((first + 1).min(count - 1)) - low) * fraction }
 }
 
-/// Red, green and blue of luminance and chroma; gray keeps its bits.
+/// Converts luminance and chroma to red, green and blue. Gray is exact.
 fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
     if ry == 0.0 && by == 0.0 {
         return [luminance; 3];
@@ -144,7 +146,8 @@ fn rgb(luminance: f32, [ry, by]: [f32; 2], weights: DVec3) -> [f32; 3] {
     [red as f32, green as f32, blue as f32]
 }
 
-/// The color of a pixel, less saturated where its neighbors are, with the same luminance (`RgbaYca::fixSaturation`).
+/// Color of a pixel with its saturation limited by that of its neighbors, at the same luminance
+/// (`RgbaYca::fixSaturation`).
 fn saturation_limited([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: DVec3) -> [f32; 3] {
     let (left, right) = (x.saturating_sub(1), (x + 1).min(row.len() - 1));
     let corners = [above[left], above[right], below[left], below[right]].map(saturation);
@@ -161,7 +164,7 @@ fn saturation_limited([above, row, below]: [&[[f32; 3]]; 3], x: usize, weights: 
     if got > 0.0 { reduced.map(|part| (f64::from(part) * wanted / got) as f32) } else { reduced }
 }
 
-/// 1 − least/greatest, or 0 without a positive part.
+/// 1 − min/max of the components, or 0 if none is positive.
 fn saturation(color: [f32; 3]) -> f32 {
     let greatest = color.into_iter().fold(f32::MIN, f32::max);
     let least = color.into_iter().fold(f32::MAX, f32::min);

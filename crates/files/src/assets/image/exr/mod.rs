@@ -1,6 +1,6 @@
-//! EXR by `exr`: `image` would only find red, green and blue without a layer's name.
+//! EXR decoder based on `exr`. `image` only supports channels R, G and B without a layer name.
 
-mod channels;
+pub(super) mod channels;
 mod chroma;
 mod sampling;
 
@@ -16,54 +16,55 @@ use ::exr::prelude::{Vec2, f16};
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-use super::facts::{Alpha, Facts};
+use super::metadata::{AlphaUsage, ImageMetadata};
 use super::primaries::Primaries;
 use super::space::ColorSpace;
-use channels::{Channel, Chosen, choose, no_color};
-use chroma::Planes;
-use sampling::{Sampling, Unpacking, Unsampled};
+use channels::{ChannelIndex, ChosenChannels, choose, no_color};
+use chroma::LuminanceChroma;
+use sampling::{BlockDecompressor, ChannelSampling, FullSamplingReader};
 
-/// Bytes of a sample.
+/// Size of a decoded sample.
 const SAMPLE_BYTES: usize = 4;
 
-/// Decoder of a color or gray, with its alpha, from one layer of the file: its display window, black outside of the data, in the largest
-/// resolution.
+/// Decodes color or gray, with alpha, from one layer: the display window at the largest resolution, black
+/// outside the data window.
 pub(super) struct ExrDecoder<R> {
-    reader: Reader<Unsampled<R>>,
-    channels: Chosen,
-    samplings: Vec<Vec<Sampling>>,
+    reader: Reader<FullSamplingReader<R>>,
+    channels: ChosenChannels,
+    samplings: Vec<Vec<ChannelSampling>>,
 }
 
 impl<R: BufRead + Seek> ExrDecoder<R> {
-    /// Creates a decoder that allocates at most `memory_bytes` besides the pixels.
+    /// Creates a decoder that allocates at most `memory_bytes` in addition to the pixels.
     pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
         let samplings = sampling::find(&mut file).map_err(ImageError::IoError)?;
-        let file = Unsampled::new(file, &samplings);
+        let file = FullSamplingReader::new(file, &samplings);
         let reader = ::exr::block::read(file, false).map_err(image_error)?;
         let Some(channels) = choose(reader.headers()) else {
             return Err(decoding_error(no_color(reader.headers())));
         };
-        let unpacking = Unpacking::new(reader.meta_data(), &samplings);
-        check_samplings(unpacking.headers(), channels).map_err(decoding_error)?;
+        let decompressor = BlockDecompressor::new(reader.meta_data(), &samplings);
+        check_samplings(decompressor.headers(), channels).map_err(decoding_error)?;
         let needed = channels.all().map(|channel| block_bytes(&reader.headers()[channel.part])).max();
-        let of_chroma =
-            channels.planes().map_or(0, |planes| Planes::memory_bytes(unpacking.headers(), planes));
-        if needed.unwrap_or_default().saturating_add(of_chroma) > memory_bytes {
+        let chroma_bytes = channels
+            .planes()
+            .map_or(0, |planes| LuminanceChroma::memory_bytes(decompressor.headers(), planes));
+        if needed.unwrap_or_default().saturating_add(chroma_bytes) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
         }
         Ok(Self { reader, channels, samplings })
     }
 
-    /// The facts that the samples do not contain.
-    pub(super) fn facts(&self) -> Facts {
-        let mut facts = Facts { alpha: Alpha::Premultiplied, ..Facts::default() };
+    /// Color space and meaning of the samples.
+    pub(super) fn metadata(&self) -> ImageMetadata {
+        let mut metadata = ImageMetadata { alpha: AlphaUsage::Premultiplied, ..ImageMetadata::default() };
         if let Some(primaries) = primaries(self.header()) {
             match primaries.to_rec_709() {
-                Some(matrix) => facts.space = ColorSpace::of_matrix(matrix),
-                None => facts.warn("its chromaticities span no colors and are ignored"),
+                Some(matrix) => metadata.space = ColorSpace::of_matrix(matrix),
+                None => metadata.warn(DEGENERATE_CHROMATICITIES),
             }
         }
-        facts
+        metadata
     }
 
     fn header(&self) -> &Header {
@@ -72,13 +73,23 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     }
 }
 
+/// Warning about chromaticities that do not form a triangle.
+pub(super) const DEGENERATE_CHROMATICITIES: &str = "degenerate chromaticities are ignored";
+
+const SIZE_NOT_DIVISIBLE: &str = "the subsampling does not divide the image size";
+const CHROMA_DIFFERS: &str = "channels RY and BY have different subsampling";
+
+pub(super) fn subsampled(channel: &str) -> String {
+    format!("channel {channel} is subsampled; only RY and BY may be")
+}
+
 fn primaries(header: &Header) -> Option<Primaries> {
     let Chromaticities { red, green, blue, white } = header.shared_attributes.chromaticities?;
     let [red, green, blue, white] = [red, green, blue, white].map(|Vec2(x, y)| [f64::from(x), f64::from(y)]);
     Some(Primaries { red, green, blue, white })
 }
 
-/// Bytes that are unpacked at once: a tile, or some rows, with all channels.
+/// Size of a decompressed block: a tile, or some rows, with all channels.
 fn block_bytes(header: &Header) -> u64 {
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     let (width, height) = match header.blocks {
@@ -91,29 +102,24 @@ fn block_bytes(header: &Header) -> u64 {
     pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
-fn description(headers: &[Header], channel: Channel) -> &ChannelDescription {
+fn description(headers: &[Header], channel: ChannelIndex) -> &ChannelDescription {
     &headers[channel.part].channels.list[channel.channel]
 }
 
-/// Checks that only chroma is subsampled, by the same steps in both channels.
-fn check_samplings(headers: &[Header], channels: Chosen) -> Result<(), String> {
-    let sampling = |channel: Channel| description(headers, channel).sampling;
-    let is_divided = |channel: &Channel| {
+/// Checks that only chroma is subsampled, and equally in both channels.
+fn check_samplings(headers: &[Header], channels: ChosenChannels) -> Result<(), String> {
+    let sampling = |channel: ChannelIndex| description(headers, channel).sampling;
+    let is_divided = |channel: &ChannelIndex| {
         let (Vec2(x, y), size) = (sampling(*channel), headers[channel.part].layer_size);
         x > 0 && y > 0 && size.width().is_multiple_of(x) && size.height().is_multiple_of(y)
     };
     if !channels.all().all(|channel| is_divided(&channel)) {
-        return Err("its subsampling does not divide its size".to_owned());
+        return Err(SIZE_NOT_DIVISIBLE.to_owned());
     }
     match channels.slots().into_iter().flatten().find(|channel| sampling(*channel) != Vec2(1, 1)) {
-        Some(channel) => {
-            let name = &description(headers, channel).name;
-            Err(format!("its channel {name} has a subsampling, which only RY and BY may have"))
-        }
+        Some(channel) => Err(subsampled(&description(headers, channel).name.to_string())),
         None => match channels.planes() {
-            Some([_, ry, by]) if sampling(ry) != sampling(by) => {
-                Err("the subsampling of its channels RY and BY differs".to_owned())
-            }
+            Some([_, ry, by]) if sampling(ry) != sampling(by) => Err(CHROMA_DIFFERS.to_owned()),
             Some(_) | None => Ok(()),
         },
     }
@@ -132,12 +138,12 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
 
     fn read_image(self, samples: &mut [u8]) -> ImageResult<()> {
         let channels = self.channels;
-        let mut unpacking = Unpacking::new(self.reader.meta_data(), &self.samplings);
-        let headers = unpacking.headers().to_vec();
-        let mut image = Image {
+        let mut decompressor = BlockDecompressor::new(self.reader.meta_data(), &self.samplings);
+        let headers = decompressor.headers().to_vec();
+        let mut image = PartialImage {
             headers: &headers,
             channels,
-            planes: channels.planes().map(|planes| Planes::new(&headers, planes)),
+            planes: channels.planes().map(|planes| LuminanceChroma::new(&headers, planes)),
         };
         samples.fill(0);
         let is_read = |part: usize| channels.all().any(|channel| channel.part == part);
@@ -145,7 +151,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
             .reader
             .filter_chunks(false, |_, tile, block| is_read(block.layer) && tile.level_index == Vec2(0, 0));
         for chunk in chunks.map_err(image_error)? {
-            let block = chunk.and_then(|chunk| unpacking.unpacked(chunk)).map_err(image_error)?;
+            let block = chunk.and_then(|chunk| decompressor.decompress(chunk)).map_err(image_error)?;
             image.add(&block, samples);
         }
         image.add_chroma(samples);
@@ -157,15 +163,15 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
     }
 }
 
-/// An image that is being read.
-struct Image<'a> {
+/// An image during decoding.
+struct PartialImage<'a> {
     headers: &'a [Header],
-    channels: Chosen,
-    planes: Option<Planes>,
+    channels: ChosenChannels,
+    planes: Option<LuminanceChroma>,
 }
 
-impl Image<'_> {
-    /// Adds the samples of a block.
+impl PartialImage<'_> {
+    /// Adds the samples of a decompressed block.
     fn add(&mut self, block: &UncompressedBlock, samples: &mut [u8]) {
         let part = block.index.layer;
         let header = &self.headers[part];
@@ -180,18 +186,18 @@ impl Image<'_> {
                 let bytes = size.width() / across * description.sample_type.bytes_per_sample();
                 let Some((line, rest)) = data.split_at_checked(bytes) else { return };
                 data = rest;
-                let line = Line { kind: description.sample_type, bytes: line };
-                let channel = Channel { part, channel };
+                let line = ChannelRow { sample_type: description.sample_type, bytes: line };
+                let channel = ChannelIndex { part, channel };
                 if let Some(planes) = &mut self.planes {
                     planes.add(channel, row / down, line);
                 }
-                self.place(channel, [left, row], line, samples);
+                self.copy(channel, [left, row], line, samples);
             }
         }
     }
 
-    /// Copies a line of a channel, from a pixel of the data window on, to its slots.
-    fn place(&self, channel: Channel, [left, row]: [usize; 2], line: Line<'_>, samples: &mut [u8]) {
+    /// Copies a row of a channel to its slots. `left` and `row` are in the data window.
+    fn copy(&self, channel: ChannelIndex, [left, row]: [usize; 2], line: ChannelRow<'_>, samples: &mut [u8]) {
         let header = &self.headers[channel.part];
         let window = header.shared_attributes.display_window;
         let offset = header.own_attributes.layer_position - window.position;
@@ -211,7 +217,7 @@ impl Image<'_> {
         }
     }
 
-    /// Makes colors of luminance and chroma.
+    /// Computes colors from luminance and chroma.
     fn add_chroma(self, samples: &mut [u8]) {
         let (Some([y, ..]), Some(planes)) = (self.channels.planes(), self.planes) else { return };
         let header = &self.headers[y.part];
@@ -233,39 +239,39 @@ impl Image<'_> {
     }
 }
 
-/// Bytes of a pixel of the image.
-fn pixel_bytes(channels: Chosen) -> usize {
+/// Size of a decoded pixel.
+fn pixel_bytes(channels: ChosenChannels) -> usize {
     SAMPLE_BYTES * if channels.alpha.is_some() { 4 } else { 3 }
 }
 
-/// Samples of one channel, side by side.
+/// Consecutive samples of one channel.
 #[derive(Clone, Copy)]
-struct Line<'a> {
-    kind: SampleType,
+struct ChannelRow<'a> {
+    sample_type: SampleType,
     bytes: &'a [u8],
 }
 
-impl Line<'_> {
-    /// Puts each value behind the `skipped` first ones into a place.
-    fn values<T>(self, skipped: usize, places: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
+impl ChannelRow<'_> {
+    /// Passes each value after the first `skipped` ones to `put`, with an item of `targets`.
+    fn values<T>(self, skipped: usize, targets: impl Iterator<Item = T>, put: impl Fn(T, f32)) {
         fn each<const N: usize, T>(
             bytes: &[u8],
             skipped: usize,
-            places: impl Iterator<Item = T>,
+            targets: impl Iterator<Item = T>,
             put: impl Fn(T, [u8; N]),
         ) {
             let samples = bytes.as_chunks().0.iter().skip(skipped);
-            places.zip(samples).for_each(|(place, sample)| put(place, *sample));
+            targets.zip(samples).for_each(|(target, sample)| put(target, *sample));
         }
-        match self.kind {
+        match self.sample_type {
             SampleType::F32 => {
-                each(self.bytes, skipped, places, |at, bytes| put(at, f32::from_ne_bytes(bytes)));
+                each(self.bytes, skipped, targets, |at, bytes| put(at, f32::from_ne_bytes(bytes)));
             }
             SampleType::F16 => {
-                each(self.bytes, skipped, places, |at, bytes| put(at, f16::from_ne_bytes(bytes).to_f32()));
+                each(self.bytes, skipped, targets, |at, bytes| put(at, f16::from_ne_bytes(bytes).to_f32()));
             }
             SampleType::U32 => {
-                each(self.bytes, skipped, places, |at, bytes| put(at, u32::from_ne_bytes(bytes) as f32));
+                each(self.bytes, skipped, targets, |at, bytes| put(at, u32::from_ne_bytes(bytes) as f32));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Color spaces that files declare.
+//! Tests of color spaces declared by files.
 
 use std::borrow::Cow;
 
@@ -7,7 +7,7 @@ use ::png::{BitDepth, ColorType, Encoder, Info, ScaledFloat, SourceChromaticitie
 use super::*;
 use crate::assets::image::space::Curve;
 
-/// A PNG of one pixel.
+/// A PNG with a single pixel.
 fn png(change: impl FnOnce(&mut Info<'static>)) -> Vec<u8> {
     let mut info = Info::with_size(1, 1);
     (info.color_type, info.bit_depth) = (ColorType::Rgb, BitDepth::Eight);
@@ -27,7 +27,7 @@ fn profile(bytes: Vec<u8>) -> impl FnOnce(&mut Info<'static>) {
     move |info| info.icc_profile = Some(Cow::Owned(bytes))
 }
 
-/// A profile of these tags.
+/// An ICC profile with these tags.
 fn icc(space: &[u8; 4], connection: &[u8; 4], tags: &[(&[u8; 4], Vec<u8>)]) -> Vec<u8> {
     let mut header = vec![0; 128];
     header[16..20].copy_from_slice(space);
@@ -104,17 +104,17 @@ fn p3() -> SourceChromaticities {
     SourceChromaticities::new((0.3127, 0.329), (0.68, 0.32), (0.265, 0.69), (0.15, 0.06))
 }
 
-/// Display P3 of the pixel in linear Rec. 709.
+/// Linear Rec. 709 of the pixel as Display P3.
 const P3: Vec3 = Vec3::new(0.5675, 0.2038, 0.0294);
 
 #[test]
-fn gamma_and_primaries_of_png_count() {
+fn png_gamma_and_primaries_are_applied() {
     assert!(is_near(color(&png(gamma(1.0))), power(1.0)));
     assert!(is_near(color(&png(gamma(0.5))), power(2.0)));
     assert!(is_near(color(&png(gamma(1.0 / 1.8))), power(1.8)));
     let wide = png(|info| info.source_chromaticities = Some(p3()));
     assert!(is_near(color(&wide), P3), "{}", color(&wide));
-    // What files in sRGB say changes no bits.
+    // The values that sRGB files declare change no bits.
     let usual = SourceChromaticities::new((0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06));
     assert!(
         is_plain(&png(gamma(0.45455))) && is_plain(&png(|info| info.source_chromaticities = Some(usual)))
@@ -122,7 +122,7 @@ fn gamma_and_primaries_of_png_count() {
 }
 
 #[test]
-fn the_first_of_several_statements_counts() {
+fn color_chunks_have_a_fixed_precedence() {
     let linear = || rgb_profile(SRGB, curv(&[]));
     let all = |info: &mut Info<'static>| {
         gamma(0.5)(info);
@@ -139,7 +139,7 @@ fn the_first_of_several_statements_counts() {
         info.srgb = Some(SrgbRenderingIntent::Perceptual);
     });
     assert!(is_plain(&srgb));
-    // The encoder writes sRGB alone: put a gamma of 1 in front of it, which the checksums allow.
+    // The encoder writes only sRGB. Insert a gamma of 1 before it; checksums are per chunk.
     let at = srgb.windows(4).position(|name| name == b"sRGB").expect("a chunk") - 4;
     let other = png(gamma(1.0));
     let from = other.windows(4).position(|name| name == b"gAMA").expect("a chunk") - 4;
@@ -169,25 +169,22 @@ fn matrix_profiles_are_converted() {
 }
 
 #[test]
-fn profiles_that_are_not_read_are_warnings() {
+fn unsupported_profiles_give_warnings() {
     let cmyk = icc(b"CMYK", b"Lab ", &[(b"A2B0", vec![0; 40])]);
     let tables = icc(b"RGB ", b"Lab ", &[(b"A2B0", vec![0; 40])]);
     let flat = rgb_profile([SRGB[0]; 3], curv(&[]));
     for (bytes, reason) in [
-        (cmyk, "it is for \"CMYK\", not for RGB"),
-        (tables, "it has tables instead of a matrix"),
-        (flat, "its primaries span no colors"),
-        (b"no profile".to_vec(), "it is broken"),
-        (rgb_profile(SRGB, b"sf32\0\0\0\0".to_vec()), "it has no curves that can be read"),
+        (cmyk, icc::wrong_space("CMYK", false)),
+        (tables, icc::LOOKUP_TABLES.to_owned()),
+        (flat, icc::DEGENERATE_PRIMARIES.to_owned()),
+        (b"no profile".to_vec(), icc::MALFORMED.to_owned()),
+        (rgb_profile(SRGB, b"sf32\0\0\0\0".to_vec()), icc::UNSUPPORTED_CURVES.to_owned()),
     ] {
         let file = png(profile(bytes));
         assert!(is_plain(&file), "{reason}");
-        let warnings = warned("a.png", &file, ImageEncoding::Color);
-        assert_eq!(
-            warnings,
-            [format!("a.png: its color profile is ignored: {reason}; its colors count as sRGB")]
-        );
-        assert_eq!(warned("a.png", &file, ImageEncoding::Srgb), warnings);
+        let warnings = warnings_of("a.png", &file, ImageEncoding::Color);
+        assert_eq!(warnings, [format!("a.png: {}", profile_ignored(&reason))]);
+        assert_eq!(warnings_of("a.png", &file, ImageEncoding::Srgb), warnings);
     }
     let whole = rgb_profile(SRGB, para(3, &SRGB_CURVE));
     for length in 0..whole.len() {
@@ -196,8 +193,8 @@ fn profiles_that_are_not_read_are_warnings() {
 }
 
 #[test]
-fn code_points_come_first() {
-    // The encoder does not write the chunk.
+fn code_points_have_the_highest_precedence() {
+    // The encoder of `png` does not write the chunk.
     let points = |codes: [u8; 4]| {
         let mut file = png(gamma(0.5));
         let chunk = [b"cICP".as_slice(), &codes].concat();
@@ -216,22 +213,22 @@ fn code_points_come_first() {
     }
     for primaries in [1, 4, 5, 6, 7, 8, 9, 10, 11, 12, 22] {
         let file = points([primaries, 13, 0, 1]);
-        assert!(warned("a.png", &file, ImageEncoding::Color).is_empty(), "{primaries}");
+        assert!(warnings_of("a.png", &file, ImageEncoding::Color).is_empty(), "{primaries}");
     }
-    // Codes without a meaning, logarithms, and the range of video.
+    // Undefined codes, a logarithmic curve, and video range.
     for codes in [[3, 13, 0, 1], [2, 2, 0, 1], [1, 9, 0, 1], [9, 16, 0, 0]] {
-        let warnings = warned("a.png", &points(codes), ImageEncoding::Color);
+        let warnings = warnings_of("a.png", &points(codes), ImageEncoding::Color);
         assert_eq!(warnings.len(), 1, "{codes:?}");
         assert!(codes[..2].iter().all(|code| warnings[0].contains(&format!(" {code}"))), "{warnings:?}");
         assert!(is_near(color(&points(codes)), color(&png(|_| {}))), "{codes:?}");
     }
 }
 
-/// The end of a PNG's first chunk.
+/// Offset of the end of a PNG's first chunk.
 const HEADER_END: usize = 33;
 
 #[test]
-fn the_encoding_of_the_scene_comes_before_the_file() {
+fn the_scenes_encoding_overrides_the_file() {
     let file = png(|info| {
         gamma(1.0)(info);
         info.source_chromaticities = Some(p3());
@@ -243,12 +240,12 @@ fn the_encoding_of_the_scene_comes_before_the_file() {
         assert_eq!(load_bytes("a.png", &file, encoding).expect("a PNG").data, data);
     }
     let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
-    let of = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
-    assert_eq!(of(&file), of(&png(|_| {})));
+    let scalar = |file: &[u8]| load_bytes("a.png", file, number).expect("a PNG").data;
+    assert_eq!(scalar(&file), scalar(&png(|_| {})));
 }
 
 #[test]
-fn jpeg_and_webp_profiles_count() {
+fn jpeg_and_webp_profiles_are_applied() {
     let linear = rgb_profile(SRGB, curv(&[]));
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.jpg");

@@ -1,10 +1,10 @@
-//! Colors next to the alpha that is their opacity, and masks.
+//! Tests of cutout textures and opacity masks.
 
 use ::image::{DynamicImage, ImageBuffer, Rgba};
 
 use super::*;
 use crate::assets::image::convert;
-use crate::assets::image::facts::Alpha;
+use crate::assets::image::metadata::AlphaUsage;
 use crate::materials::Channel;
 use crate::math::Vec4;
 
@@ -13,46 +13,47 @@ fn bytes(pixels: &[[u8; 4]]) -> DynamicImage {
     ImageBuffer::from_raw(pixels.len() as u32, 1, samples).map(DynamicImage::ImageRgba8).expect("whole")
 }
 
-fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: Alpha) -> Texels {
-    convert::texels(image, encoding, &Facts { alpha, ..Facts::default() })
+fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: AlphaUsage) -> Texels {
+    convert::texels(image, encoding, &ImageMetadata { alpha, ..ImageMetadata::default() })
 }
 
 #[test]
-fn alpha_weights_colors_unless_it_is_1_everywhere() {
+fn alpha_weights_colors_unless_it_is_constant_1() {
     let cut = [[255, 0, 0, 51], [0, 255, 0, 255]];
-    let of =
-        |pixels: &[[u8; 4]], curve| texels(bytes(pixels), ImageEncoding::CutOut(curve), Alpha::Straight).data;
-    assert_eq!(of(&cut, ColorCurve::Auto), TexelData::SrgbAlpha8(cut.to_vec()));
-    assert_eq!(of(&cut, ColorCurve::Linear), TexelData::LinearAlpha8(cut.to_vec()));
-    assert_eq!(of(&[[1, 2, 3, 255]], ColorCurve::Srgb), TexelData::Srgb8(vec![[1, 2, 3]]));
-    let texels = Texels { width: 2, height: 1, data: of(&cut, ColorCurve::Auto), unusable: 0 };
+    let data = |pixels: &[[u8; 4]], curve| {
+        texels(bytes(pixels), ImageEncoding::CutOut(curve), AlphaUsage::Straight).data
+    };
+    assert_eq!(data(&cut, ColorCurve::Auto), TexelData::SrgbAlpha8(cut.to_vec()));
+    assert_eq!(data(&cut, ColorCurve::Linear), TexelData::LinearAlpha8(cut.to_vec()));
+    assert_eq!(data(&[[1, 2, 3, 255]], ColorCurve::Srgb), TexelData::Srgb8(vec![[1, 2, 3]]));
+    let texels = Texels { width: 2, height: 1, data: data(&cut, ColorCurve::Auto), unusable: 0 };
     assert_eq!([texels.get(0, 0), texels.get(1, 0)], [Vec3::X, Vec3::Y]);
     assert_eq!(texels.weighted(0), Vec4::new(0.2, 0.0, 0.0, 0.2));
     assert!((texels.mean() - Vec3::new(1.0 / 6.0, 5.0 / 6.0, 0.0)).length() < 1e-6);
 }
 
 #[test]
-fn premultiplied_colors_are_divided_once() {
+fn premultiplied_colors_are_unmultiplied_once() {
     let image = || {
         let pixels = vec![0.5, 0.25, 0.0, 0.5, 3.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0];
         ImageBuffer::<Rgba<f32>, _>::from_raw(3, 1, pixels).map(DynamicImage::ImageRgba32F).expect("whole")
     };
-    let of = |curve| texels(image(), ImageEncoding::CutOut(curve), Alpha::Premultiplied);
+    let loaded = |curve| texels(image(), ImageEncoding::CutOut(curve), AlphaUsage::Premultiplied);
     for curve in [ColorCurve::Auto, ColorCurve::Linear] {
-        let texels = of(curve);
+        let texels = loaded(curve);
         assert_eq!([0, 2].map(|x| texels.get(x, 0)), [Vec3::new(1.0, 0.5, 0.0), Vec3::ONE]);
         assert_eq!(texels.weighted(0), Vec4::new(0.5, 0.25, 0.0, 0.5));
     }
-    assert!((of(ColorCurve::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
-    // Without such an opacity, the color is the one over black.
-    let plain = texels(image(), ImageEncoding::Color, Alpha::Premultiplied);
+    assert!((loaded(ColorCurve::Srgb).get(0, 0).y - srgb_to_linear(0.5)).abs() < 1e-6);
+    // Without a cutout, the color is the one composited over black.
+    let plain = texels(image(), ImageEncoding::Color, AlphaUsage::Premultiplied);
     assert_eq!(plain.get(0, 0), Vec3::new(0.5, 0.25, 0.0));
 }
 
 #[test]
-fn a_mask_without_alpha_of_its_own_is_its_luminance() {
+fn masks_without_alpha_use_the_luminance() {
     let number = |image: DynamicImage, of| {
-        texels(image, ImageEncoding::Number { of, is_srgb: false }, Alpha::Straight).get(0, 0).x
+        texels(image, ImageEncoding::Number { of, is_srgb: false }, AlphaUsage::Straight).get(0, 0).x
     };
     let mask = |of_any_color| PixelValue::Mask { of_any_color };
     let gray = || bytes(&[[51, 51, 51, 255], [0, 0, 0, 255]]);
@@ -70,13 +71,11 @@ fn a_mask_without_alpha_of_its_own_is_its_luminance() {
     }
     let warning = |image: DynamicImage, of| {
         let encoding = ImageEncoding::Number { of, is_srgb: false };
-        convert::constant_alpha(&image, encoding, &Facts::default())
+        convert::constant_alpha(&image, encoding, &ImageMetadata::default())
     };
-    assert!(warning(gray(), mask(false)).is_some_and(|words| words.contains("its luminance is")));
-    assert!(warning(red(), mask(false)).is_some_and(|words| words.contains("is opaque")));
-    assert!(
-        warning(bytes(&[[1, 2, 3, 0]]), PixelValue::Opacity).is_some_and(|words| words.contains("invisible"))
-    );
+    assert_eq!(warning(gray(), mask(false)), Some(convert::LUMINANCE_USED));
+    assert_eq!(warning(red(), mask(false)), Some(convert::OPAQUE));
+    assert_eq!(warning(bytes(&[[1, 2, 3, 0]]), PixelValue::Opacity), Some(convert::INVISIBLE));
     assert_eq!(warning(red(), PixelValue::Opacity), None);
     assert_eq!(warning(bytes(&[[1, 2, 3, 9], [1, 2, 3, 255]]), mask(false)), None);
 }

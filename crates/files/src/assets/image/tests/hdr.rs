@@ -1,8 +1,9 @@
-//! HDR files as programs write them.
+//! Tests of Radiance HDR files from various programs.
 
 use super::*;
+use crate::assets::image::hdr::{RUN_TOO_LONG, WRONG_LENGTH, line_ignored, unsupported_encoding};
 
-/// Pixel of exponent 129, whose unit is 1/128.
+/// A pixel with exponent 129, whose unit is 1/128.
 const PIXEL: [u8; 4] = [128, 64, 32, 129];
 
 fn file(header: &str, size: &str, pixels: &[u8]) -> Vec<u8> {
@@ -17,12 +18,12 @@ fn texels(file: &[u8], encoding: ImageEncoding) -> Vec<Vec3> {
     }
 }
 
-fn one(header: &str) -> Vec3 {
+fn single_pixel(header: &str) -> Vec3 {
     texels(&file(header, "-Y 1 +X 1", &PIXEL), ImageEncoding::Color)[0]
 }
 
 #[test]
-fn any_program_may_have_written_it() {
+fn headers_of_all_programs_are_read() {
     for start in ["#?RADIANCE\n", "#?RGBE\n", "#?rpict\n", "#?AUTOPANO\n", "#?RGBE\r\n", "#?\n"] {
         for rest in [
             "FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n",
@@ -35,15 +36,15 @@ fn any_program_may_have_written_it() {
             assert_eq!(texels(&file, ImageEncoding::Color), [Vec3::new(1.0, 0.5, 0.25)], "{start}{rest}");
         }
     }
-    assert!(says("a.hdr", b"#RADIANCE\n\n-Y 1 +X 1\nabcd").contains("no image that can be read"));
-    let said = says("a.hdr", &file("FORMAT=32-bit_rle_xyzw\n", "-Y 1 +X 1", &PIXEL));
-    assert!(said.contains("\"32-bit_rle_xyzw\" is neither"), "{said}");
+    assert_eq!(error("a.hdr", b"#RADIANCE\n\n-Y 1 +X 1\nabcd"), unknown_format());
+    let unknown = error("a.hdr", &file("FORMAT=32-bit_rle_xyzw\n", "-Y 1 +X 1", &PIXEL));
+    assert!(unknown.ends_with(&unsupported_encoding("32-bit_rle_xyzw")), "{unknown}");
     for size in ["-Y 1 +Y 1", "-Y 1", "X 1 Y 1", "-Y -1 +X 1", "-Y 1 +X 1 2"] {
         assert!(load_bytes("a.hdr", &file("", size, &PIXEL), ImageEncoding::Color).is_err(), "{size}");
     }
 }
 
-/// The pixels of 3 columns and 2 rows, numbered from the top left, in the order of the file.
+/// Pixels of 3 columns and 2 rows, numbered from the top left, in file order.
 #[test]
 fn all_orientations_give_the_same_image() {
     for (size, order) in [
@@ -65,15 +66,15 @@ fn all_orientations_give_the_same_image() {
 }
 
 #[test]
-fn values_are_divided_by_all_exposures_and_corrections() {
+fn exposures_and_corrections_divide_the_values() {
     let plain = Vec3::new(1.0, 0.5, 0.25);
-    assert_eq!(one("EXPOSURE=2\n"), plain / 2.0);
-    assert_eq!(one("EXPOSURE=2\nEXPOSURE= 4\n"), plain / 8.0);
-    assert_eq!(one("COLORCORR=4 2 1\n"), Vec3::splat(0.25));
-    assert_eq!(one("COLORCORR=4 2 1\nEXPOSURE=0.5\nCOLORCORR=1 2 4\n"), Vec3::new(0.5, 0.25, 0.125));
-    // Quoted lines of other headers do not count.
-    assert_eq!(one("\tEXPOSURE=2\n# EXPOSURE=2\n"), plain);
-    // The exposure is no matter of encoding.
+    assert_eq!(single_pixel("EXPOSURE=2\n"), plain / 2.0);
+    assert_eq!(single_pixel("EXPOSURE=2\nEXPOSURE= 4\n"), plain / 8.0);
+    assert_eq!(single_pixel("COLORCORR=4 2 1\n"), Vec3::splat(0.25));
+    assert_eq!(single_pixel("COLORCORR=4 2 1\nEXPOSURE=0.5\nCOLORCORR=1 2 4\n"), Vec3::new(0.5, 0.25, 0.125));
+    // Quoted lines of other headers are ignored.
+    assert_eq!(single_pixel("\tEXPOSURE=2\n# EXPOSURE=2\n"), plain);
+    // The exposure applies to all encodings.
     let number = ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false };
     for encoding in [ImageEncoding::Linear, ImageEncoding::Raw, number] {
         let [plain, divided] =
@@ -83,8 +84,8 @@ fn values_are_divided_by_all_exposures_and_corrections() {
     for line in ["EXPOSURE=0", "EXPOSURE=-1", "EXPOSURE=x", "EXPOSURE=1 2", "COLORCORR=1 1", "GAMMA=2.2"] {
         let file = file(&format!("# first\n{line}\n"), "-Y 1 +X 1", &PIXEL);
         assert_eq!(texels(&file, ImageEncoding::Color), [plain], "{line}");
-        let warnings = warned("a.hdr", &file, ImageEncoding::Color);
-        assert_eq!(warnings, [format!("a.hdr:3: `{line}` is ignored")]);
+        let warnings = warnings_of("a.hdr", &file, ImageEncoding::Color);
+        assert_eq!(warnings, [format!("a.hdr:3: {}", line_ignored(line))]);
     }
 }
 
@@ -98,31 +99,32 @@ fn primaries_are_converted() {
     assert!(near(color(rec_2020, &white), Vec3::splat(0.5)));
     assert!(near(color(rec_2020, &[64, 0, 0, 129]), Vec3::new(0.8302, 0.0, 0.0)));
     assert_eq!(color("PRIMARIES=.64 .33 .3 .6 .15 .06 .3127 .329\n", &PIXEL), Vec3::new(1.0, 0.5, 0.25));
-    // Data stay.
+    // Noncolor data is not converted.
     for encoding in [ImageEncoding::Linear, ImageEncoding::Srgb] {
         let [with, without] =
             [rec_2020, ""].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding));
         assert_eq!(with, without);
     }
-    // Y of XYZ is in lumens; white of equal energy becomes white.
+    // Y of XYZ is in lumens. Equal-energy white becomes white.
     let xyz = "FORMAT=32-bit_rle_xyze\n";
     assert!(near(color(xyz, &[179, 179, 179, 136]), Vec3::ONE));
     for broken in ["PRIMARIES=.64 .33 .3 .6 .15 .06", "PRIMARIES=0 0 0 0 0 0 0 0"] {
         let file = file(&format!("{broken}\n"), "-Y 1 +X 1", &PIXEL);
-        assert_eq!(warned("a.hdr", &file, ImageEncoding::Color), [format!("a.hdr:2: `{broken}` is ignored")]);
+        let warnings = warnings_of("a.hdr", &file, ImageEncoding::Color);
+        assert_eq!(warnings, [format!("a.hdr:2: {}", line_ignored(broken))]);
     }
 }
 
-/// A line of `count` pixels with channels in runs.
+/// A scanline of `count` pixels, run-length encoded by channel.
 fn runs(count: u16, value: impl Fn(u16) -> [u8; 4]) -> Vec<u8> {
     let mut line = vec![2, 2];
     line.extend(count.to_be_bytes());
     for channel in 0..4 {
         let mut at = 0;
         while at < count {
-            let own = value(at)[channel];
-            let run = (at..count).take(127).take_while(|&at| value(at)[channel] == own).count() as u16;
-            line.extend(if run > 2 { vec![128 + run as u8, own] } else { vec![1, own] });
+            let first = value(at)[channel];
+            let run = (at..count).take(127).take_while(|&at| value(at)[channel] == first).count() as u16;
+            line.extend(if run > 2 { vec![128 + run as u8, first] } else { vec![1, first] });
             at += if run > 2 { run } else { 1 };
         }
     }
@@ -130,7 +132,7 @@ fn runs(count: u16, value: impl Fn(u16) -> [u8; 4]) -> Vec<u8> {
 }
 
 #[test]
-fn old_and_new_runs_and_flat_lines_hold_the_same() {
+fn all_scanline_encodings_give_the_same_pixels() {
     let value = |at: u16| [(at / 5 % 256) as u8, (at % 3) as u8, 9, 136];
     let expected = |count: u16| -> Vec<Vec3> {
         (0..count).map(|at| Vec3::from_array([0, 1, 2].map(|i| f32::from(value(at)[i])))).collect()
@@ -144,24 +146,25 @@ fn old_and_new_runs_and_flat_lines_hold_the_same() {
             assert_eq!(texels(&file("", &size, &runs), ImageEncoding::Color), expected(count), "{count}");
         }
     }
-    // (1, 1, 1, n) repeats n times, a second one 256 · n times.
+    // (1, 1, 1, n) repeats the previous pixel n times; a second one 256 · n times.
     let old = [5, 6, 7, 136, 1, 1, 1, 3, 1, 1, 1, 2, 8, 0, 0, 136, 1, 1, 1, 1];
     let size = "-Y 1 +X 518";
     let found = texels(&file("", size, &old), ImageEncoding::Color);
     assert_eq!(found[..516], vec![Vec3::new(5.0, 6.0, 7.0); 516]);
     assert_eq!(found[516..], [Vec3::new(8.0, 0.0, 0.0); 2]);
-    // A line that begins like one of runs, of pixels too few for runs.
+    // A line that starts like a run-length encoded one but has too few pixels for that.
     assert_eq!(texels(&file("", "-Y 1 +X 1", &[2, 2, 0, 1]), ImageEncoding::Color).len(), 1);
 }
 
 #[test]
-fn broken_runs_are_errors() {
-    let says = |size: &str, pixels: &[u8]| says("a.hdr", &file("", size, pixels));
-    assert!(says("-Y 1 +X 8", &[2, 2, 0, 9]).contains("another length"));
-    assert!(says("-Y 1 +X 8", &[2, 2, 0, 8, 137, 1]).contains("does not fit"));
-    assert!(says("-Y 1 +X 8", &[2, 2, 0, 8, 0, 1]).contains("does not fit"));
-    assert!(says("-Y 1 +X 2", &[1, 1, 1, 1]).contains("does not fit"));
-    assert!(says("-Y 1 +X 2", &[9, 1, 1, 1, 1, 1, 1, 255]).contains("does not fit"));
-    assert!(says("-Y 1 +X 2", &PIXEL).contains("the file ends before the image does"));
-    assert!(says("-Y 2 +X 0", &PIXEL).contains("0 × 2 pixels"));
+fn malformed_runs_are_rejected() {
+    let fails =
+        |size: &str, pixels: &[u8], reason: &str| error("a.hdr", &file("", size, pixels)).ends_with(reason);
+    assert!(fails("-Y 1 +X 8", &[2, 2, 0, 9], WRONG_LENGTH));
+    assert!(fails("-Y 1 +X 8", &[2, 2, 0, 8, 137, 1], RUN_TOO_LONG));
+    assert!(fails("-Y 1 +X 8", &[2, 2, 0, 8, 0, 1], RUN_TOO_LONG));
+    assert!(fails("-Y 1 +X 2", &[1, 1, 1, 1], RUN_TOO_LONG));
+    assert!(fails("-Y 1 +X 2", &[9, 1, 1, 1, 1, 1, 1, 255], RUN_TOO_LONG));
+    assert!(fails("-Y 1 +X 2", &PIXEL, jpeg::TRUNCATED));
+    assert!(fails("-Y 2 +X 0", &PIXEL, &empty_image(0, 2)));
 }

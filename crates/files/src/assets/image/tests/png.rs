@@ -1,4 +1,4 @@
-//! PNG files of every kind, with what may stand beside the picture.
+//! Tests of PNG files of all pixel types.
 
 use std::borrow::Cow;
 
@@ -25,15 +25,15 @@ fn texels(file: &[u8]) -> TexelData {
 }
 
 #[test]
-fn every_kind_of_pixel_is_read() {
-    let grey = |bytes: &[u8]| TexelData::Linear8(bytes.iter().map(|&byte| [byte; 3]).collect());
+fn all_pixel_types_are_read() {
+    let gray = |bytes: &[u8]| TexelData::Linear8(bytes.iter().map(|&byte| [byte; 3]).collect());
     let file = encoded(info(ColorType::Grayscale, BitDepth::One, 8, 1), &[0b1010_0000]);
-    assert_eq!(texels(&file), grey(&[255, 0, 255, 0, 0, 0, 0, 0]));
+    assert_eq!(texels(&file), gray(&[255, 0, 255, 0, 0, 0, 0, 0]));
     let file = encoded(info(ColorType::Grayscale, BitDepth::Four, 2, 1), &[0x3f]);
-    assert_eq!(texels(&file), grey(&[0x33, 255]));
+    assert_eq!(texels(&file), gray(&[0x33, 255]));
     let mut transparent = info(ColorType::Grayscale, BitDepth::Eight, 2, 1);
     transparent.trns = Some(Cow::Borrowed(&[0, 9]));
-    assert_eq!(texels(&encoded(transparent, &[9, 8])), grey(&[9, 8]));
+    assert_eq!(texels(&encoded(transparent, &[9, 8])), gray(&[9, 8]));
     let mut indexed = info(ColorType::Indexed, BitDepth::Two, 4, 1);
     indexed.palette = Some(Cow::Borrowed(&[1, 2, 3, 4, 5, 6]));
     indexed.trns = Some(Cow::Borrowed(&[255, 0]));
@@ -49,9 +49,9 @@ fn every_kind_of_pixel_is_read() {
 }
 
 #[test]
-fn a_note_on_orientation_is_followed() {
+fn exif_orientation_is_applied() {
     let mut turned = info(ColorType::Grayscale, BitDepth::Eight, 3, 1);
-    // One entry, Orientation (0x0112), a short: 6, a quarter clockwise.
+    // A single entry: Orientation (0x0112), a short, 6 (rotated clockwise by 90°).
     let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
     turned.exif_metadata = Some(Cow::Borrowed(exif));
     let texels = load_bytes("a.png", &encoded(turned, &[1, 2, 3]), ImageEncoding::Linear).expect("a PNG");

@@ -1,8 +1,9 @@
-//! Alpha of TGA files.
+//! Tests of alpha in TGA and BMP files.
 
 use super::*;
 
-/// A pixel of 32 bits, blue first, with these alpha bits in the header and a type of alpha in an extension area.
+/// A file with one 32-bit pixel in BGRA order. `alpha_bits` is stored in the header, `kind` in the extension
+/// area.
 fn file(alpha_bits: u8, pixel: [u8; 4], kind: Option<u8>) -> Vec<u8> {
     let mut file = vec![0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 1, 0, 32, 0x20 | alpha_bits];
     file.extend(pixel);
@@ -23,7 +24,7 @@ fn opacity(file: &[u8]) -> f32 {
 }
 
 #[test]
-fn the_header_or_the_extension_says_what_the_fourth_byte_is() {
+fn header_or_extension_defines_tga_alpha() {
     let white = [255, 255, 255, 51];
     for (bits, kind, expected) in [
         (0, None, 1.0),
@@ -37,14 +38,14 @@ fn the_header_or_the_extension_says_what_the_fourth_byte_is() {
     ] {
         assert!((opacity(&file(bits, white, kind)) - expected).abs() < 1e-6, "{bits} {kind:?}");
     }
-    // Colors that are multiplied by alpha are divided where alpha is the opacity.
+    // Premultiplied colors are divided by alpha in cutouts.
     let cut_out = |file: &[u8]| {
         let texels = load_bytes("a.tga", file, ImageEncoding::CutOut(ColorCurve::Linear)).expect("a TGA");
         texels.get(0, 0)
     };
     assert!((cut_out(&file(8, [51, 0, 102, 102], Some(4))) - Vec3::new(1.0, 0.0, 0.5)).length() < 1e-6);
     assert!((cut_out(&file(8, [51, 0, 102, 102], None)) - Vec3::new(0.4, 0.0, 0.2)).length() < 1e-6);
-    // An area beyond the end, or a footer without one.
+    // A footer whose extension area is beyond the end of the file.
     let mut broken = file(8, white, Some(3));
     broken.truncate(18 + 4);
     broken.extend([255, 255, 255, 127, 0, 0, 0, 0]);
@@ -52,14 +53,14 @@ fn the_header_or_the_extension_says_what_the_fourth_byte_is() {
     assert!((opacity(&broken) - 0.2).abs() < 1e-6);
 }
 
-/// A TGA of these pixels in one row: kind, bits of a pixel, alpha bits of the header.
+/// A TGA file with one row of pixels: image type, bits per pixel, alpha bits of the header.
 fn row([kind, bits, alpha_bits]: [u8; 3], pixels: &[u8]) -> Vec<u8> {
     let width = pixels.len() as u8 / bits.div_ceil(8).max(1);
     [&[0, 0, kind, 0, 0, 0, 0, 0, 0, 0, 0, 0, width, 0, 1, 0, bits, 0x20 | alpha_bits], pixels].concat()
 }
 
 #[test]
-fn gray_of_16_bits_is_gray_and_alpha() {
+fn sixteen_bit_gray_has_alpha() {
     let pixels = [51, 255, 255, 102];
     let packed = [0x01, 51, 255, 255, 102];
     for alpha_bits in [0, 1, 8, 15] {
@@ -70,7 +71,7 @@ fn gray_of_16_bits_is_gray_and_alpha() {
         }] {
             let texels = load_bytes("a.tga", &file, ImageEncoding::Linear).expect("a TGA");
             assert_eq!(texels.data, TexelData::Linear8(vec![[51; 3], [255; 3]]));
-            // Without alpha bits in the header, the luminance is the opacity.
+            // If the header declares no alpha bits, opacity is the luminance.
             let expected = if alpha_bits == 0 { 0.2 } else { 1.0 };
             assert!((opacity(&file) - expected).abs() < 1e-6, "{alpha_bits}");
         }
@@ -78,7 +79,7 @@ fn gray_of_16_bits_is_gray_and_alpha() {
 }
 
 #[test]
-fn alpha_bits_that_do_not_fit_are_ignored() {
+fn impossible_alpha_bits_are_ignored() {
     for (kind, bits, pixels, expected) in [
         (2, 24, vec![10, 20, 30], [30, 20, 10]),
         (2, 32, vec![10, 20, 30, 40], [30, 20, 10]),
@@ -92,14 +93,14 @@ fn alpha_bits_that_do_not_fit_are_ignored() {
         }
     }
     for (kind, bits) in [(3, 24), (11, 32), (2, 8), (0, 8), (32, 8), (4, 24)] {
-        let said = says("a.tga", &row([kind, bits, 0], &[0; 12]));
+        let error = error("a.tga", &row([kind, bits, 0], &[0; 12]));
         let number = if kind == 3 || kind == 11 || kind == 2 { bits } else { kind };
-        assert!(said.contains(&number.to_string()) && said.contains("PNG"), "{said}");
+        assert!(error.contains(&number.to_string()) && error.contains("PNG"), "{error}");
     }
 }
 
 #[test]
-fn a_bitmap_whose_alpha_is_unused_is_opaque() {
+fn bmp_alpha_of_zero_everywhere_is_unused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.bmp");
     let number = ImageEncoding::Number { of: PixelValue::Opacity, is_srgb: false };

@@ -1,4 +1,4 @@
-//! Animations in WebP.
+//! Exif data and animations in WebP files.
 
 use ::image_webp::{ColorType, WebPEncoder};
 
@@ -10,15 +10,15 @@ fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
     [name.as_slice(), &(data.len() as u32).to_le_bytes(), data, &padding].concat()
 }
 
-/// An animation of frames of one color each, 1 × 1.
+/// An animation of single-color frames of 1 × 1 pixels.
 fn animation(colors: &[[u8; 3]]) -> Vec<u8> {
-    // Flag of an animation; width and height less 1.
+    // Animation flag; width and height minus 1.
     let mut chunks = chunk(b"VP8X", &[0x02, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
     chunks.extend(chunk(b"ANIM", &[0; 6]));
     for color in colors {
         let mut still = Vec::new();
         WebPEncoder::new(&mut still).encode(color, 1, 1, ColorType::Rgb8).expect("written");
-        // Place, size, duration, and a flag of no blending; then the chunk of the image behind the header of its file.
+        // Position, size, duration, and the flag for no blending. The chunk of the image follows.
         let mut frame = vec![0; 12];
         frame.extend([100, 0, 0, 0x02]);
         frame.extend(&still[12..]);
@@ -28,14 +28,14 @@ fn animation(colors: &[[u8; 3]]) -> Vec<u8> {
 }
 
 #[test]
-fn exif_data_may_begin_as_in_a_jpeg() {
+fn exif_data_may_have_the_prefix_of_jpeg() {
     let (red, blue) = ([255, 0, 0], [0, 0, 255]);
     let mut still = Vec::new();
     WebPEncoder::new(&mut still).encode(&[red, blue].concat(), 2, 1, ColorType::Rgb8).expect("written");
-    // One entry, Orientation (0x0112), a short: 3, a half turn.
+    // One entry: Orientation (0x0112), type SHORT, value 3 (a half turn).
     let exif = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x03\0\0\0\0\0\0".as_slice();
     for exif in [exif.to_vec(), [b"Exif\0\0", exif].concat()] {
-        // Flag of Exif data; width and height less 1.
+        // Exif flag; width and height minus 1.
         let mut chunks = chunk(b"VP8X", &[0x08, 0, 0, 0, 1, 0, 0, 0, 0, 0]);
         chunks.extend(&still[12..]);
         chunks.extend(chunk(b"EXIF", &exif));
@@ -46,13 +46,13 @@ fn exif_data_may_begin_as_in_a_jpeg() {
 }
 
 #[test]
-fn an_animation_warns_that_one_frame_is_used() {
+fn an_animation_gives_a_warning() {
     let (red, blue) = ([255, 0, 0], [0, 0, 255]);
     for (frames, warnings) in [(vec![red, blue, blue], 1), (vec![red], 0)] {
         let file = animation(&frames);
         let texels = load_bytes("a.webp", &file, ImageEncoding::Color).expect("a WebP");
         assert_eq!(texels.data, TexelData::Srgb8(vec![red]));
-        let found = warned("a.webp", &file, ImageEncoding::Color);
+        let found = warnings_of("a.webp", &file, ImageEncoding::Color);
         assert_eq!(found.len(), warnings, "{found:?}");
         assert!(found.iter().all(|warning| warning.contains(" 3 ")), "{found:?}");
     }

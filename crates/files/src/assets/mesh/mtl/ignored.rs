@@ -1,74 +1,75 @@
-//! Warnings about statements that are not shown to the letter.
+//! Warnings about MTL statements that are ignored or approximated.
 
 use std::path::Path;
 
-use super::map::{Kind, Map};
+use super::map::{Map, MapKind};
 use super::material::{is_hidden_by_tr, material};
-use super::statements::{Colour, Number};
-use super::{At, MtlMaterial};
+use super::statements::{MtlColor, MtlNumber};
+use super::{MtlMaterial, WithLine};
 use crate::assets::FileMaterial;
 use crate::math::Vec3;
 
-/// A statement that is not shown to the letter.
+/// A statement that is ignored or approximated.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::assets::mesh) struct Ignored {
+pub(in crate::assets::mesh) struct IgnoredStatement {
     pub(super) line: usize,
     pub(super) words: String,
 }
 
-/// Warnings about a file and some of its materials; equal ones of several materials are one.
+/// Collects warnings about a file and its used materials. Warnings that several materials have in common are
+/// merged.
 pub(in crate::assets::mesh) fn warnings<'a>(
     path: &Path,
-    of_file: Vec<Ignored>,
+    of_file: Vec<IgnoredStatement>,
     materials: impl Iterator<Item = &'a MtlMaterial>,
 ) -> Vec<String> {
     let mut all = of_file;
     let of_file = all.len();
-    all.extend(materials.flat_map(of_material));
-    let mut warnings: Vec<(Ignored, usize)> = Vec::new();
-    for (index, one) in all.into_iter().enumerate() {
-        let known = warnings.iter_mut().find(|(known, _)| index >= of_file && known.words == one.words);
+    all.extend(materials.flat_map(material_warnings));
+    let mut warnings: Vec<(IgnoredStatement, usize)> = Vec::new();
+    for (index, ignored) in all.into_iter().enumerate() {
+        let known = warnings.iter_mut().find(|(known, _)| index >= of_file && known.words == ignored.words);
         match known {
             Some((_, more)) => *more += 1,
-            None => warnings.push((one, 0)),
+            None => warnings.push((ignored, 0)),
         }
     }
-    let text = |(Ignored { line, words }, more)| {
+    let text = |(IgnoredStatement { line, words }, more)| {
         let more = if more > 0 { format!(" ({more} more)") } else { String::new() };
         format!("{}:{line}: {words}{more}", path.display())
     };
     warnings.into_iter().map(text).collect()
 }
 
-fn of_material(found: &MtlMaterial) -> Vec<Ignored> {
-    let own = material(found, Path::new(""));
+fn material_warnings(found: &MtlMaterial) -> Vec<IgnoredStatement> {
+    let converted = material(found, Path::new(""));
     let mut ignored = found.ignored.clone();
     let mut add = |line: Option<usize>, words: &str| {
-        ignored.push(Ignored { line: line.unwrap_or(found.line), words: words.to_owned() });
+        ignored.push(IgnoredStatement { line: line.unwrap_or(found.line), words: words.to_owned() });
     };
-    let model = own.illumination_model.unwrap_or(2);
+    let model = converted.illumination_model.unwrap_or(2);
     let line_of_model = found.illumination.map(|at| at.line);
     match model {
-        0 => add(line_of_model, "`illum 0`, a color without shading, is shown as a matte surface"),
-        10 => add(line_of_model, "`illum 10`, shadows on an invisible surface, is shown as a plain surface"),
-        11.. => add(line_of_model, "this `illum` is no model of the format; it counts as 2"),
+        0 => add(line_of_model, UNSHADED),
+        10 => add(line_of_model, SHADOW_CATCHER),
+        11.. => add(line_of_model, UNKNOWN_MODEL),
         1..=9 => {}
     }
-    let is_glass = matches!(model, 4 | 6 | 7 | 9) && own.opacity_texture.is_none();
-    if is_glass && own.ior <= 1.0 {
-        add(line_of_model, "glass without an index of refraction `Ni` above 1 is invisible");
+    let is_glass = matches!(model, 4 | 6 | 7 | 9) && converted.opacity_texture.is_none();
+    if is_glass && converted.ior <= 1.0 {
+        add(line_of_model, INVISIBLE_GLASS);
     }
-    if is_hidden_by_tr(found) && own.opacity_texture.is_none() && !is_glass {
-        let line = found.numbers[Number::Transparency as usize].map(|at| at.line);
-        add(line, "`Tr 1` without `d` counts as opaque; write `d 0` for what is not to be seen");
+    if is_hidden_by_tr(found) && converted.opacity_texture.is_none() && !is_glass {
+        let line = found.numbers[MtlNumber::Transparency as usize].map(|at| at.line);
+        add(line, OPAQUE_TR);
     }
-    let has_filter = found.color(Colour::Filter).filter(|at| at.value != [1.0; 3]);
+    let has_filter = found.color(MtlColor::Filter).filter(|at| at.value != [1.0; 3]);
     if let Some(at) = has_filter
-        && (is_glass || own.opacity < 1.0 || own.opacity_texture.is_some())
+        && (is_glass || converted.opacity < 1.0 || converted.opacity_texture.is_some())
     {
-        add(Some(at.line), "`Tf` is ignored; a `material` of the scene may have a `tint`");
+        add(Some(at.line), FILTER_IGNORED);
     }
-    add_reflection(found, &own, model, &mut add);
+    add_reflection(found, &converted, model, &mut add);
     add_physical(found, &mut add);
     for (kind, map) in &found.maps {
         add_map(found, (*kind, map), &mut add);
@@ -76,75 +77,103 @@ fn of_material(found: &MtlMaterial) -> Vec<Ignored> {
     ignored
 }
 
-fn line<T>(at: Option<At<T>>) -> Option<usize> {
+pub(super) const UNSHADED: &str = "`illum 0` (unshaded color) is rendered as a matte surface";
+pub(super) const SHADOW_CATCHER: &str = "`illum 10` (shadow catcher) is rendered as an ordinary surface";
+pub(super) const UNKNOWN_MODEL: &str = "unknown illumination model; `illum 2` is used";
+pub(super) const INVISIBLE_GLASS: &str = "glass without an index of refraction `Ni` above 1 is invisible";
+const OPAQUE_TR: &str = "`Tr 1` without `d` is rendered as opaque; use `d 0` for an invisible surface";
+pub(super) const FILTER_IGNORED: &str = "`Tf` is ignored; use `tint` in a material of the scene";
+const NO_HIGHLIGHT: &str = "`Ks` has no effect without `Ns` above 0";
+pub(super) const GAINS_ENERGY: &str =
+    "the material reflects more light than it receives; keep `Kd` and `Ks` at or below 1";
+pub(super) const BRIGHT_MIRROR: &str = "`Ks` of a mirror is clamped to 1";
+pub(super) const DIFFUSE_UNDER_MIRROR: &str =
+    "`Kd` is ignored because the mirror reflection `Ks` is stronger";
+pub(super) const AMBIENT_MAP: &str = "`map_Ka` is not supported; ambient light uses the diffuse color";
+
+pub(super) fn statement_ignored(keyword: &str) -> String {
+    format!("`{keyword}` is ignored")
+}
+
+pub(super) fn map_unsupported(keyword: &str) -> String {
+    format!("`{keyword}` is not supported")
+}
+
+pub(super) fn option_ignored(option: &str) -> String {
+    format!("option `{option}` is ignored")
+}
+
+fn line<T>(at: Option<WithLine<T>>) -> Option<usize> {
     at.map(|at| at.line)
 }
 
-/// Reflectances that cannot be shown.
+/// Warns about reflectances that cannot be rendered as given.
 fn add_reflection(
     found: &MtlMaterial,
-    own: &FileMaterial,
+    converted: &FileMaterial,
     model: u8,
     add: &mut impl FnMut(Option<usize>, &str),
 ) {
-    let (diffuse, specular) = (found.color(Colour::Diffuse), found.color(Colour::Specular));
-    let is_rough = matches!(model, 0..=2 | 10..) || own.specular == Vec3::ZERO;
-    let is_phong = own.physical.is_none() && !matches!(model, 4 | 6 | 7 | 9);
-    let has_strength = own.specular != Vec3::ZERO || own.specular_texture.is_some();
+    let (diffuse, specular) = (found.color(MtlColor::Diffuse), found.color(MtlColor::Specular));
+    let is_rough = matches!(model, 0..=2 | 10..) || converted.specular == Vec3::ZERO;
+    let is_phong = converted.physical.is_none() && !matches!(model, 4 | 6 | 7 | 9);
+    let has_strength = converted.specular != Vec3::ZERO || converted.specular_texture.is_some();
     let is_shiny = is_phong && matches!(model, 2 | 10..);
-    if is_shiny && has_strength && !own.has_highlight() {
-        let line = line(specular).or(found.map(Kind::Specular).map(|map| map.line));
-        add(line, "`Ks` without `Ns` above 0 makes no highlight");
+    if is_shiny && has_strength && !converted.has_highlight() {
+        let line = line(specular).or(found.map(MapKind::Specular).map(|map| map.line));
+        add(line, NO_HIGHLIGHT);
     }
     if !is_phong {
         return;
     }
-    let kd = if own.diffuse_texture.is_some() { Vec3::ZERO } else { own.diffuse };
-    let has_highlight = is_shiny && own.has_highlight() && own.specular_texture.is_none();
-    let ks = if has_highlight { own.specular * (2.0 / (own.shininess + 2.0)) } else { Vec3::ZERO };
+    let kd = if converted.diffuse_texture.is_some() { Vec3::ZERO } else { converted.diffuse };
+    let has_highlight = is_shiny && converted.has_highlight() && converted.specular_texture.is_none();
+    let ks =
+        if has_highlight { converted.specular * (2.0 / (converted.shininess + 2.0)) } else { Vec3::ZERO };
     if (kd + ks).max_element() > 1.0 + 1e-5 {
         let line = line(diffuse).or(line(specular));
-        add(line, "this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1");
-    } else if own.specular.max_element() > 1.0 + 1e-5 && !is_rough {
-        add(line(specular), "this mirror reflects more light than falls on it; `Ks` counts as 1");
+        add(line, GAINS_ENERGY);
+    } else if converted.specular.max_element() > 1.0 + 1e-5 && !is_rough {
+        add(line(specular), BRIGHT_MIRROR);
     }
-    let is_mirror = !is_rough && !own.is_coated();
-    if is_mirror && (own.diffuse != Vec3::ZERO || own.diffuse_texture.is_some()) {
-        add(line(diffuse), "`Kd` below a stronger mirror `Ks` is ignored");
+    let is_mirror = !is_rough && !converted.is_coated();
+    if is_mirror && (converted.diffuse != Vec3::ZERO || converted.diffuse_texture.is_some()) {
+        add(line(diffuse), DIFFUSE_UNDER_MIRROR);
     }
 }
 
-/// Numbers of the extension that have no effect.
+/// Warns about parameters of the PBR extension that have no effect.
 fn add_physical(found: &MtlMaterial, add: &mut impl FnMut(Option<usize>, &str)) {
-    for number in [Number::Sheen, Number::Anisotropy, Number::AnisotropyRotation] {
+    for number in [MtlNumber::Sheen, MtlNumber::Anisotropy, MtlNumber::AnisotropyRotation] {
         let given = found.numbers[number as usize].filter(|at| at.value != 0.0);
         if let Some(at) = given {
-            add(Some(at.line), &format!("`{}` is ignored", number.keyword()));
+            add(Some(at.line), &statement_ignored(number.keyword()));
         }
     }
 }
 
-/// A map that is not read, or options of it.
-fn add_map(found: &MtlMaterial, (kind, map): (Kind, &Map), add: &mut impl FnMut(Option<usize>, &str)) {
+/// Warns about an unsupported map or unsupported options of a map.
+fn add_map(found: &MtlMaterial, (kind, map): (MapKind, &Map), add: &mut impl FnMut(Option<usize>, &str)) {
     match kind {
-        Kind::Other(name) => return add(Some(map.line), &format!("`{name}` is not read")),
-        Kind::Ambient => {
-            let is_diffuse = found.map(Kind::Diffuse).is_some_and(|diffuse| diffuse.files().eq(map.files()));
+        MapKind::Other(name) => return add(Some(map.line), &map_unsupported(name)),
+        MapKind::Ambient => {
+            let is_diffuse =
+                found.map(MapKind::Diffuse).is_some_and(|diffuse| diffuse.files().eq(map.files()));
             if !is_diffuse {
-                add(Some(map.line), "`map_Ka` is not read; ambient light uses the diffuse color");
+                add(Some(map.line), AMBIENT_MAP);
             }
             return;
         }
-        Kind::Diffuse
-        | Kind::Specular
-        | Kind::Emission
-        | Kind::Opacity
-        | Kind::Normal
-        | Kind::Bump
-        | Kind::Roughness
-        | Kind::Metallic => {}
+        MapKind::Diffuse
+        | MapKind::Specular
+        | MapKind::Emission
+        | MapKind::Opacity
+        | MapKind::Normal
+        | MapKind::Bump
+        | MapKind::Roughness
+        | MapKind::Metallic => {}
     }
     for option in map.ignored(kind) {
-        add(Some(map.line), &format!("the option `{option}` is ignored"));
+        add(Some(map.line), &option_ignored(&option));
     }
 }

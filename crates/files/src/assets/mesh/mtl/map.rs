@@ -1,4 +1,4 @@
-//! Maps of an MTL: a file behind options.
+//! Maps of an MTL file: options followed by a file name.
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
@@ -8,27 +8,27 @@ use crate::assets::FileTexture;
 use crate::materials::{Channel, PixelValue};
 use crate::math::{DVec2, Vec2};
 
-/// What a map is of.
+/// Material parameter that a map controls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum MapKind {
     Diffuse,
     Specular,
     Emission,
     Opacity,
-    /// `norm`, `map_Kn`.
+    /// `norm` or `map_Kn`.
     Normal,
-    /// `bump`, `map_Bump`: normals or heights.
+    /// `bump` or `map_Bump`: a normal map or a height map.
     Bump,
     Roughness,
     Metallic,
     Ambient,
-    /// Not read.
+    /// Unsupported.
     Other(&'static str),
 }
 
-impl Kind {
-    /// The kind by its keyword, in any case.
-    pub(super) fn of(keyword: &str) -> Option<Self> {
+impl MapKind {
+    /// The kind of a keyword, ignoring case.
+    pub(super) fn from_keyword(keyword: &str) -> Option<Self> {
         const OTHERS: [&str; 13] = [
             "map_Ns",
             "disp",
@@ -58,7 +58,7 @@ impl Kind {
         })
     }
 
-    /// Whether its values are colors.
+    /// Whether the map contains colors.
     fn is_color(self) -> bool {
         match self {
             Self::Diffuse | Self::Specular | Self::Emission | Self::Ambient => true,
@@ -83,7 +83,7 @@ impl Kind {
     }
 }
 
-/// A map as the file has it.
+/// A map with its options, as in the file.
 #[derive(Clone, Debug)]
 pub(super) struct Map {
     pub(super) line: usize,
@@ -91,18 +91,18 @@ pub(super) struct Map {
     offset: [f64; 2],
     range: [f64; 2],
     is_clamped: bool,
-    /// The number of a pixel, if a channel is named.
+    /// Channel to read as a scalar, if specified.
     number: Option<PixelValue>,
-    /// Factor on bumps.
+    /// Scale of the normal map's slopes.
     pub(super) strength: f64,
     /// Options without effect.
     ignored: Vec<String>,
-    /// The text behind the options.
+    /// File name: the text after the options.
     name: String,
 }
 
 impl Map {
-    /// Parses the text behind the keyword. `None` if it has no file.
+    /// Parses the text after the keyword. `None` if it has no file name.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let mut map = Self {
             line: 0,
@@ -115,18 +115,18 @@ impl Map {
             ignored: Vec::new(),
             name: String::new(),
         };
-        let mut rest = Words(text.trim());
+        let mut rest = MapArguments(text.trim());
         while let Some(option) = rest.option() {
             map.add(&option, &mut rest);
         }
-        // Some exporters quote names that have spaces.
+        // Some exporters quote names that contain spaces.
         let name = rest.0;
         map.name = name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name).to_owned();
         (!map.name.is_empty()).then_some(map)
     }
 
-    /// Reads the arguments of an option.
-    fn add(&mut self, option: &str, rest: &mut Words<'_>) {
+    /// Parses the arguments of an option.
+    fn add(&mut self, option: &str, rest: &mut MapArguments<'_>) {
         match option {
             "-s" => {
                 let [u, v, _] = rest.numbers([1.0; 3]);
@@ -174,7 +174,7 @@ impl Map {
         }
     }
 
-    fn add_channel(&mut self, rest: &mut Words<'_>) {
+    fn add_channel(&mut self, rest: &mut MapArguments<'_>) {
         let Some(letter) = rest.word() else { return };
         let channel = |channel| Some(PixelValue::Channel(channel));
         self.number = match letter.to_ascii_lowercase().as_str() {
@@ -190,8 +190,8 @@ impl Map {
         };
     }
 
-    /// Options without effect on a map of this kind.
-    pub(super) fn ignored(&self, kind: Kind) -> impl Iterator<Item = String> {
+    /// Options that have no effect on a map of this kind.
+    pub(super) fn ignored(&self, kind: MapKind) -> impl Iterator<Item = String> {
         let channel =
             (self.number.is_some() && (kind.is_color() || kind.is_normal())).then(|| "-imfchan".to_owned());
         let range = (self.range != [0.0, 1.0] && kind.is_normal()).then(|| "-mm".to_owned());
@@ -199,12 +199,13 @@ impl Map {
         self.ignored.iter().cloned().chain(channel).chain(range).chain(strength)
     }
 
-    /// Spellings of the file, relative to the MTL's folder: whole, then without what may be a comment.
+    /// Candidate paths of the file, relative to the MTL file's folder: the whole name, then the name without
+    /// possible comments.
     pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
         cut_at_comments(&self.name).flat_map(|name| spellings(&name.replace('\\', "/")))
     }
 
-    /// The texture, whose file exists if one of the spellings does.
+    /// The texture of this map. Its path is the first candidate that exists, or else the first.
     pub(super) fn texture(&self, folder: &Path) -> Option<FileTexture> {
         let [u, v] = self.repeat;
         let [base, gain] = self.range.map(|number| number as f32);
@@ -214,16 +215,17 @@ impl Map {
             is_clamped: self.is_clamped,
             range: (base, gain),
             number: self.number,
-            ..FileTexture::new(found(folder, self.files())?)
+            ..FileTexture::new(first_existing(folder, self.files())?)
         })
     }
 }
 
-/// Words of a statement, of which the last ones are the file.
-struct Words<'a>(&'a str);
+/// Arguments of a map statement, of which the last is the file name.
+struct MapArguments<'a>(&'a str);
 
-impl<'a> Words<'a> {
-    /// The option that comes next, in lower case. Another word is the start of the file's name, even with a dash.
+impl<'a> MapArguments<'a> {
+    /// Consumes an option and returns it in lower case. Any other word starts the file name, even if it
+    /// begins with a dash.
     fn option(&mut self) -> Option<String> {
         const OPTIONS: [&str; 13] = [
             "-s", "-o", "-t", "-mm", "-bm", "-clamp", "-imfchan", "-boost", "-texres", "-blendu", "-blendv",
@@ -237,16 +239,16 @@ impl<'a> Words<'a> {
         })
     }
 
-    /// The next word, unless it is the last one.
+    /// Consumes the next word unless it is the last one.
     fn word(&mut self) -> Option<&'a str> {
         let (word, rest) = self.0.split_once(char::is_whitespace)?;
         self.0 = rest.trim_start();
         Some(word)
     }
 
-    /// Up to `N` numbers in place of the usual ones.
-    fn numbers<const N: usize>(&mut self, usual: [f64; N]) -> [f64; N] {
-        let mut numbers = usual;
+    /// Consumes up to `N` numbers. Missing ones keep their default.
+    fn numbers<const N: usize>(&mut self, default: [f64; N]) -> [f64; N] {
+        let mut numbers = default;
         for number in &mut numbers {
             let Some((word, _)) = self.0.split_once(char::is_whitespace) else { break };
             let Ok(value) = word.parse::<f32>() else { break };
@@ -258,7 +260,7 @@ impl<'a> Words<'a> {
         numbers
     }
 
-    /// `on` or `off`.
+    /// Consumes `on` or `off`.
     fn switch(&mut self) -> Option<bool> {
         let (word, _) = self.0.split_once(char::is_whitespace)?;
         let value = [("on", true), ("off", false)];
@@ -268,14 +270,14 @@ impl<'a> Words<'a> {
     }
 }
 
-/// The text whole, then without its last comment, and so on.
+/// Returns the text, then the text without its last comment, and so on.
 pub(in crate::assets::mesh) fn cut_at_comments(text: &str) -> impl Iterator<Item = &str> {
     let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with([' ', '\t']);
     let cuts = text.rmatch_indices('#').filter(is_comment).map(|(at, _)| text[..at].trim_end());
     std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())
 }
 
-/// A name in UTF-8, and in Latin-1 if it has letters beyond ASCII.
+/// Returns the name in UTF-8, and also in Latin-1 if it has non-ASCII letters.
 pub(in crate::assets::mesh) fn spellings(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
     let latin1: Option<Vec<u8>> = name.chars().map(|letter| u8::try_from(u32::from(letter)).ok()).collect();
     let latin1 = latin1.filter(|_| !name.is_ascii()).map(|bytes| PathBuf::from(OsStr::from_bytes(&bytes)));
@@ -283,7 +285,10 @@ pub(in crate::assets::mesh) fn spellings(name: &str) -> impl Iterator<Item = Pat
 }
 
 /// The first of these files that exists, or else the first.
-pub(in crate::assets::mesh) fn found(folder: &Path, names: impl Iterator<Item = PathBuf>) -> Option<PathBuf> {
+pub(in crate::assets::mesh) fn first_existing(
+    folder: &Path,
+    names: impl Iterator<Item = PathBuf>,
+) -> Option<PathBuf> {
     let files: Vec<_> = names.map(|name| folder.join(name)).collect();
     files.iter().find(|file| file.exists()).or(files.first()).cloned()
 }

@@ -1,19 +1,19 @@
-//! Lines of an MTL as statements, whose keywords may be in any case.
+//! Parses lines of an MTL file. Keywords are case-insensitive.
 
-use super::map::{Kind, Map};
+use super::map::{Map, MapKind};
 
-/// Colors.
+/// A color statement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Colour {
+pub(super) enum MtlColor {
     Ambient,
     Diffuse,
     Specular,
     Emission,
-    /// The transmission filter.
+    /// Transmission filter.
     Filter,
 }
 
-impl Colour {
+impl MtlColor {
     /// All colors with their keywords, in the order of the enum.
     pub(super) const ALL: [(Self, &'static str); 5] = [
         (Self::Ambient, "Ka"),
@@ -24,9 +24,9 @@ impl Colour {
     ];
 }
 
-/// Numbers.
+/// A statement with a single number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Number {
+pub(super) enum MtlNumber {
     Shininess,
     Ior,
     Dissolve,
@@ -40,7 +40,7 @@ pub(super) enum Number {
     AnisotropyRotation,
 }
 
-impl Number {
+impl MtlNumber {
     /// All numbers with their keywords, in the order of the enum.
     pub(super) const ALL: [(Self, &'static str); 11] = [
         (Self::Shininess, "Ns"),
@@ -56,22 +56,22 @@ impl Number {
         (Self::AnisotropyRotation, "anisor"),
     ];
 
-    /// Its keyword.
+    /// Keyword of the statement.
     pub(super) fn keyword(self) -> &'static str {
         Self::ALL[self as usize].1
     }
 }
 
-/// A line.
+/// A parsed line.
 pub(super) enum Statement {
-    /// Empty, a comment, or without an effect on any image.
+    /// An empty line, a comment, or a statement that affects no image.
     Nothing,
     New(String),
-    Colour(Colour, [f64; 3]),
-    Number(Number, f64),
+    Color(MtlColor, [f64; 3]),
+    Number(MtlNumber, f64),
     Illumination(u8),
-    Map(Kind, Map),
-    /// A statement without effect, with a warning.
+    Map(MapKind, Map),
+    /// A statement without effect, with its warning.
     Ignored(String),
 }
 
@@ -86,34 +86,51 @@ pub(super) fn parse(line: &str) -> Result<Statement, String> {
     }
     if is("newmtl") {
         let name = (!rest.is_empty()).then(|| rest.to_owned());
-        return name.map(Statement::New).ok_or_else(|| "`newmtl` is followed by a name".to_owned());
+        return name.map(Statement::New).ok_or_else(|| expected_after("newmtl", "a name"));
     }
-    if let Some((color, _)) = Colour::ALL.into_iter().find(|(_, name)| is(name)) {
+    if let Some((color, _)) = MtlColor::ALL.into_iter().find(|(_, name)| is(name)) {
         return self::color(keyword, color, rest);
     }
-    if let Some((number, _)) = Number::ALL.into_iter().find(|(_, name)| is(name)) {
+    if let Some((number, _)) = MtlNumber::ALL.into_iter().find(|(_, name)| is(name)) {
         return self::number(keyword, number, rest);
     }
-    if let Some(kind) = Kind::of(keyword) {
+    if let Some(kind) = MapKind::from_keyword(keyword) {
         return match Map::parse(rest) {
             Some(map) => Ok(Statement::Map(kind, map)),
-            None => Err(format!("`{keyword}` is followed by a file")),
+            None => Err(expected_after(keyword, "a file name")),
         };
     }
     match keyword.to_ascii_lowercase().as_str() {
         "illum" => illumination(rest),
-        // It sharpens reflection maps, which are reported themselves.
+        // Only affects reflection maps, which have their own warning.
         "sharpness" => Ok(Statement::Nothing),
-        _ => Ok(Statement::Ignored(format!("`{}` is no known statement and is ignored", short(keyword)))),
+        _ => Ok(Statement::Ignored(unknown_statement(keyword))),
     }
 }
 
-/// The start of a word that may be long.
-fn short(word: &str) -> String {
+/// Reason to reject a statement with missing or invalid arguments.
+pub(super) fn expected_after(keyword: &str, expected: &str) -> String {
+    format!("expected {expected} after `{keyword}`")
+}
+
+pub(super) const THREE_NUMBERS: &str = "three finite numbers";
+pub(super) const ONE_NUMBER: &str = "a finite number";
+pub(super) const INTEGER: &str = "an integer";
+
+pub(super) fn unknown_statement(keyword: &str) -> String {
+    format!("unknown statement `{}` is ignored", truncated(keyword))
+}
+
+pub(super) fn spectrum_unsupported(keyword: &str) -> String {
+    format!("the spectrum of `{keyword}` is not supported; the default color is used")
+}
+
+/// The first 20 characters of a word.
+fn truncated(word: &str) -> String {
     word.chars().take(20).collect()
 }
 
-/// The words before a comment.
+/// Words before a comment.
 fn words(rest: &str) -> Vec<&str> {
     rest.split('#').next().unwrap_or_default().split_whitespace().collect()
 }
@@ -122,13 +139,12 @@ fn finite<T: std::str::FromStr + Into<f64>>(word: &str) -> Option<f64> {
     word.parse().ok().map(T::into).filter(|number: &f64| number.is_finite())
 }
 
-/// A color of three numbers, or of one, which is gray.
-fn color(keyword: &str, color: Colour, rest: &str) -> Result<Statement, String> {
+/// Parses a color from three numbers, or from one gray value.
+fn color(keyword: &str, color: MtlColor, rest: &str) -> Result<Statement, String> {
     let words = words(rest);
     let (is_xyz, words) = match words.as_slice() {
         ["spectral", ..] => {
-            let words = format!("the spectrum of `{keyword}` is not read; the usual color is used");
-            return Ok(Statement::Ignored(words));
+            return Ok(Statement::Ignored(spectrum_unsupported(keyword)));
         }
         ["xyz", words @ ..] => (true, words),
         words => (false, words),
@@ -137,12 +153,12 @@ fn color(keyword: &str, color: Colour, rest: &str) -> Result<Statement, String> 
     let values = match numbers.as_deref() {
         Some([gray]) => [*gray; 3],
         Some([red, green, blue]) => [*red, *green, *blue],
-        Some(_) | None => return Err(format!("`{keyword}` is followed by three finite numbers")),
+        Some(_) | None => return Err(expected_after(keyword, THREE_NUMBERS)),
     };
-    Ok(Statement::Colour(color, if is_xyz { rgb(values) } else { values }))
+    Ok(Statement::Color(color, if is_xyz { rgb(values) } else { values }))
 }
 
-/// CIE's XYZ as linear Rec. 709 (ITU-R BT.709, its primaries and its white D65).
+/// Converts CIE XYZ to linear Rec. 709 (ITU-R BT.709 primaries, D65 white).
 fn rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     [
         3.240_97 * x - 1.537_38 * y - 0.498_61 * z,
@@ -151,20 +167,18 @@ fn rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// A number; `d -halo` counts as `d`.
-fn number(keyword: &str, number: Number, rest: &str) -> Result<Statement, String> {
+/// Parses a number. `d -halo` is read as `d`.
+fn number(keyword: &str, number: MtlNumber, rest: &str) -> Result<Statement, String> {
     let words = words(rest);
     let word = match words.as_slice() {
-        ["-halo", word, ..] if number == Number::Dissolve => Some(word),
+        ["-halo", word, ..] if number == MtlNumber::Dissolve => Some(word),
         words => words.first(),
     };
     let value = word.and_then(|word| finite::<f32>(word));
-    value
-        .map(|value| Statement::Number(number, value))
-        .ok_or_else(|| format!("`{keyword}` is followed by a finite number"))
+    value.map(|value| Statement::Number(number, value)).ok_or_else(|| expected_after(keyword, ONE_NUMBER))
 }
 
 fn illumination(rest: &str) -> Result<Statement, String> {
     let number = words(rest).first().and_then(|word| word.parse().ok());
-    number.map(Statement::Illumination).ok_or_else(|| "`illum` is followed by a whole number".to_owned())
+    number.map(Statement::Illumination).ok_or_else(|| expected_after("illum", INTEGER))
 }

@@ -1,27 +1,27 @@
-//! From the statements of an OBJ to vertices with one index.
+//! Builds vertices with a single index from the statements of an OBJ file.
 
 use std::collections::HashMap;
 
-use super::super::parsed::Parsed;
-use super::statements::{Corner, NONE, Smoothing, Statements};
+use super::super::parsed::ParsedMesh;
+use super::statements::{CornerIndices, NONE, Smoothing, Statements};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::{Vec2, Vec3};
 
-/// Consecutive faces that share the statements before them.
-pub(super) struct Run {
+/// Consecutive faces with the same material, smoothing group and object.
+pub(super) struct FaceRun {
     /// Number of faces.
     pub(super) faces: usize,
     pub(super) material: u32,
     pub(super) smoothing: Smoothing,
-    /// Whether an object, a group or a material begins here, with vertices of its own.
+    /// Whether an object, a group or a material starts here, which shares no vertices with the previous ones.
     pub(super) is_object: bool,
 }
 
-/// Adds the faces of all runs. A corner becomes a vertex for each combination of its indices in an object.
-pub(super) fn build(statements: &Statements, runs: &[Run], parsed: &mut Parsed) {
+/// Adds the faces of all runs. Within an object, each distinct combination of indices becomes a vertex.
+pub(super) fn build(statements: &Statements, runs: &[FaceRun], parsed: &mut ParsedMesh) {
     let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
-    let smooths = |run: &Run| run.faces > 0 && run.smoothing != Smoothing::Unsaid;
-    let mut builder = Builder {
+    let smooths = |run: &FaceRun| run.faces > 0 && run.smoothing != Smoothing::Unspecified;
+    let mut builder = VertexBuilder {
         statements,
         has_uvs: has(1),
         has_normals: has(2),
@@ -37,10 +37,10 @@ pub(super) fn build(statements: &Statements, runs: &[Run], parsed: &mut Parsed) 
     runs.iter().for_each(|run| builder.run(run));
 }
 
-/// Smoothing group of a vertex, and for a flat one the number of its face from 1.
-type Tag = (u32, u32);
+/// Smoothing group of a vertex. With flat shading, also the number of its face, from 1.
+type SmoothingTag = (u32, u32);
 
-struct Builder<'a> {
+struct VertexBuilder<'a> {
     statements: &'a Statements,
     has_uvs: bool,
     has_normals: bool,
@@ -48,16 +48,16 @@ struct Builder<'a> {
     has_smoothing: bool,
     has_materials: bool,
     /// Vertices of the current object.
-    vertices: HashMap<(Corner, Tag), u32>,
-    /// Normal of each position in a smoothing group, in all objects.
+    vertices: HashMap<(CornerIndices, SmoothingTag), u32>,
+    /// Normal index of each position and smoothing group, across all objects.
     normals: HashMap<(u32, u32), u32>,
-    parsed: &'a mut Parsed,
+    parsed: &'a mut ParsedMesh,
     face: usize,
     corner: usize,
 }
 
-impl Builder<'_> {
-    fn run(&mut self, run: &Run) {
+impl VertexBuilder<'_> {
+    fn run(&mut self, run: &FaceRun) {
         if run.is_object {
             self.vertices.clear();
         }
@@ -76,12 +76,12 @@ impl Builder<'_> {
         }
     }
 
-    fn vertex(&mut self, corner: Corner, smoothing: Smoothing) -> u32 {
+    fn vertex(&mut self, corner: CornerIndices, smoothing: Smoothing) -> u32 {
         let has_normal = corner[2] != NONE;
         let tag = match smoothing {
             Smoothing::Flat if !has_normal => (NormalGroup::FLAT, self.face as u32),
             Smoothing::Group(group) if !has_normal => (group.min(NormalGroup::FLAT - 1), 0),
-            Smoothing::Flat | Smoothing::Group(_) | Smoothing::Unsaid => (NormalGroup::BY_ANGLE, 0),
+            Smoothing::Flat | Smoothing::Group(_) | Smoothing::Unspecified => (NormalGroup::BY_ANGLE, 0),
         };
         let next = self.parsed.positions.len() as u32;
         let vertex = *self.vertices.entry((corner, tag)).or_insert(next);
@@ -91,7 +91,7 @@ impl Builder<'_> {
         vertex
     }
 
-    fn add(&mut self, corner: Corner, group: u32) {
+    fn add(&mut self, corner: CornerIndices, group: u32) {
         let [position, uv, normal] = corner.map(|index| index as usize);
         let Statements { vertices, uvs, normals, .. } = self.statements;
         let index = self.parsed.positions.len() as u32;

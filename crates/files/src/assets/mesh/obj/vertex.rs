@@ -1,27 +1,34 @@
-//! Vertices of an OBJ, with the colors that programs add to them.
+//! Vertices of an OBJ file, with the colors that several programs add to them.
 
 use super::super::parsed::ColorRange;
-use super::super::text::shown;
+use super::super::text::expected;
+use super::statements::too_few;
 use super::words::{Words, number};
 use crate::math::DVec3;
 
-/// Positions and their colors.
+/// Positions and colors.
 #[derive(Default)]
 pub(super) struct Vertices {
     pub(super) positions: Vec<DVec3>,
-    /// Color of each position, `None` where the file has none; shorter than the positions if the last ones have none.
+    /// Color of each position, if it has one. May be shorter than `positions`.
     colors: Vec<Option<[f32; 3]>>,
     range: ColorRange,
-    /// Colors in ZBrush's comments `#MRGB`, in the order of the positions.
+    /// Colors from ZBrush's `#MRGB` comments, in the order of the positions.
     painted: Vec<[u8; 3]>,
-    /// The least alpha, and the offset of its statement.
+    /// Minimum alpha, and the byte offset of its statement.
     least_alpha: Option<(f64, usize)>,
-    /// Offset of the first statement with words that are not used.
+    /// Byte offset of the first statement with unknown words.
     pub(super) first_excess: Option<usize>,
 }
 
+pub(super) const WEIGHT_OR_COLOR: &str =
+    "expected one weight or three color components after the coordinates";
+pub(super) const ZERO_WEIGHT: &str = "a vertex has weight 0";
+pub(super) const NONFINITE_COLOR: &str = "vertex colors must be finite";
+
 impl Vertices {
-    /// Reads a `v` statement: x y z, then a weight, a color, a color and its alpha, or a weight, a color and its alpha.
+    /// Parses a `v` statement: x y z, then nothing, a weight, a color, a color and its alpha, or a weight, a
+    /// color and its alpha.
     pub(super) fn read(&mut self, words: &mut Words<'_>) -> Result<(), String> {
         let start = words.at();
         let mut numbers = [0.0; 8];
@@ -34,16 +41,16 @@ impl Vertices {
                     self.first_excess.get_or_insert(start);
                     break;
                 }
-                None => return Err(format!("expected 3 coordinates, found {}", shown(word))),
+                None => return Err(expected("3 coordinates", word)),
             }
             count += 1;
         }
         let [x, y, z, rest @ ..] = numbers;
         let (weight, color, alpha) = match (count, rest) {
-            (0..3, _) => return Err(format!("expected 3 coordinates, found {count}")),
+            (0..3, _) => return Err(too_few(3, "coordinates", count)),
             (3, _) => (1.0, None, None),
             (4, [weight, ..]) => (weight, None, None),
-            (5, _) => return Err("coordinates are followed by one weight or three colors".to_owned()),
+            (5, _) => return Err(WEIGHT_OR_COLOR.to_owned()),
             (6, [r, g, b, ..]) => (1.0, Some([r, g, b]), None),
             (7, [r, g, b, alpha, _]) => (1.0, Some([r, g, b]), Some(alpha)),
             (8, [weight, r, g, b, alpha]) => (weight, Some([r, g, b]), Some(alpha)),
@@ -53,10 +60,10 @@ impl Vertices {
             }
         };
         if weight == 0.0 {
-            return Err("the weight of a vertex is 0".to_owned());
+            return Err(ZERO_WEIGHT.to_owned());
         }
         if let Some(color) = color {
-            self.color(color)?;
+            self.add_color(color)?;
         }
         if let Some(alpha) = alpha
             && self.least_alpha.is_none_or(|(least, _)| alpha < least)
@@ -67,10 +74,10 @@ impl Vertices {
         Ok(())
     }
 
-    /// Adds the color of the position that follows.
-    fn color(&mut self, color: [f64; 3]) -> Result<(), String> {
+    /// Adds the color of the next position.
+    fn add_color(&mut self, color: [f64; 3]) -> Result<(), String> {
         if !color.iter().all(|part| part.is_finite()) {
-            return Err("the colors of a vertex are finite numbers".to_owned());
+            return Err(NONFINITE_COLOR.to_owned());
         }
         self.range.add(color);
         self.colors.resize(self.positions.len(), None);
@@ -78,7 +85,8 @@ impl Vertices {
         Ok(())
     }
 
-    /// Reads the words of a comment `#MRGB`: a mask, red, green and blue in two hexadecimal digits each, per vertex.
+    /// Parses the words of an `#MRGB` comment: for each vertex a mask, red, green and blue, as two
+    /// hexadecimal digits each.
     pub(super) fn read_paint(&mut self, line: &[u8]) {
         let digits = line.trim_ascii().chunks_exact(8);
         let painted = digits.map_while(|digits| {
@@ -94,12 +102,13 @@ impl Vertices {
         !self.colors.is_empty() || !self.painted.is_empty()
     }
 
-    /// Offset of the vertex with the least alpha, if that is below 1. Alpha has the range of the colors.
-    pub(super) fn translucent(&self) -> Option<usize> {
+    /// Byte offset of the vertex with the minimum alpha, if that is less than 1, which is ignored. Alpha has the
+    /// same range as the colors.
+    pub(super) fn transparent(&self) -> Option<usize> {
         self.least_alpha.filter(|(least, _)| *least < self.range.one()).map(|(_, start)| start)
     }
 
-    /// The color of a position; white if it has none.
+    /// The color of a position, or white if it has none.
     pub(super) fn color_of(&self, index: usize) -> [u8; 3] {
         if self.colors.is_empty() {
             return self.painted.get(index).copied().unwrap_or([u8::MAX; 3]);

@@ -1,10 +1,10 @@
-//! Statements of an OBJ and their words.
+//! Splits an OBJ file into statements and words.
 
 use fast_float2::parse;
 
 use super::super::text::decoded;
 
-/// A position in the text of an OBJ.
+/// A cursor in the text of an OBJ file.
 pub(super) struct Words<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -27,8 +27,8 @@ impl<'a> Words<'a> {
         self.at < self.bytes.len()
     }
 
-    /// The next word of this statement. A statement ends with its line or at a comment; a backslash at the end of a line
-    /// continues it on the next one.
+    /// Consumes the next word of this statement. A statement ends with its line or at a comment; a backslash
+    /// at the end of a line continues it.
     pub(super) fn word(&mut self) -> Option<&'a [u8]> {
         loop {
             match self.bytes.get(self.at)? {
@@ -52,7 +52,7 @@ impl<'a> Words<'a> {
         Some(word)
     }
 
-    /// The rest of this statement as one name, which may contain blanks and `#`.
+    /// Consumes the rest of this statement as a name, which may contain blanks and `#`.
     pub(super) fn name(&mut self) -> String {
         let mut name = String::new();
         loop {
@@ -68,7 +68,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    /// The rest of this line.
+    /// Consumes the rest of this line.
     pub(super) fn line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let line = &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())];
@@ -76,7 +76,7 @@ impl<'a> Words<'a> {
         line
     }
 
-    /// The start of the next line if only blanks follow the backslash at `at`.
+    /// Offset of the next line if only blanks follow the backslash at `at`.
     fn continuation(&self, at: usize) -> Option<usize> {
         let rest = &self.bytes[at + 1..];
         let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace() && **byte != b'\n').count();
@@ -84,13 +84,13 @@ impl<'a> Words<'a> {
     }
 }
 
-/// A word as a number. Overflow gives infinity; `nan` and `inf` are numbers.
+/// Parses a number. Overflow gives infinity; `nan` and `inf` are numbers.
 pub(super) fn number(word: &[u8]) -> Option<f64> {
     parse(word).ok()
 }
 
-/// A word as a whole number.
-pub(super) fn whole(word: &[u8]) -> Option<i64> {
+/// Parses an integer.
+pub(super) fn integer(word: &[u8]) -> Option<i64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn backslashes_continue_statements_and_comments_end_them() {
+    fn backslashes_continue_statements() {
         assert_eq!(
             statements("f 1 2\\\n3 \\ \n 4# x \\\nv 1\r\n"),
             [vec!["f", "1", "2", "3", "4"], vec!["v", "1"]]

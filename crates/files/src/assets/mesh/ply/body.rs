@@ -1,57 +1,61 @@
-//! The numbers behind a PLY header, as text or as bytes in either order.
+//! Reads the numbers after a PLY header, as text or as binary data of either byte order.
 
-use super::super::text::{Cursor, shown};
+use super::super::text::{Cursor, expected};
 use super::header::Scalar;
 
-/// Numbers in the order of the file. Errors are in words, without the place.
+/// Numbers in file order. Errors do not include the position in the file.
 pub(super) trait Numbers: Clone {
     fn float(&mut self, scalar: Scalar) -> Result<f64, String>;
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
 
-    /// Ends an item of an element.
+    /// Ends an item (a vertex or a face) of an element.
     fn end_item(&mut self) {}
 
-    /// Byte of the file.
+    /// Byte offset in the file.
     fn at(&self) -> usize;
 
-    /// Byte of the next number.
+    /// Byte offset of the next number.
     fn start(&self) -> usize {
         self.at()
     }
 
-    /// Whether the rest of the file can hold so many numbers.
+    /// Whether the rest of the file can hold `count` numbers.
     fn can_hold(&self, scalar: Scalar, count: u64) -> bool;
 }
 
-/// Words between blanks.
-#[derive(Clone)]
-pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) Lines);
+/// Reason to reject a truncated body.
+pub(super) const END_OF_FILE: &str = "unexpected end of file";
 
-/// Meaning of the ends of lines.
+/// Numbers separated by whitespace.
+#[derive(Clone)]
+pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) LineEnds);
+
+/// How line ends are interpreted.
 #[derive(Clone, Copy)]
-pub(super) enum Lines {
-    /// They are blanks.
+pub(super) enum LineEnds {
+    /// As whitespace.
     Blank,
-    /// They end items. Values before them that no property takes are left out: the number of such lines, and a byte of the first.
+    /// As ends of items. Extra values before them are skipped: the number of such lines, and the byte offset
+    /// of the first.
     EndItems(u64, Option<usize>),
 }
 
 impl Ascii<'_> {
     fn seek_word(&mut self) -> Result<(), String> {
-        if self.0.skip_blank() { Ok(()) } else { Err("the file ends here".to_owned()) }
+        if self.0.skip_blank() { Ok(()) } else { Err(END_OF_FILE.to_owned()) }
     }
 }
 
 impl Numbers for Ascii<'_> {
     fn float(&mut self, _: Scalar) -> Result<f64, String> {
         self.seek_word()?;
-        self.0.float().ok_or_else(|| format!("expected a number, found {}", shown(self.0.word())))
+        self.0.float().ok_or_else(|| expected("a number", self.0.word()))
     }
 
     fn integer(&mut self, _: Scalar) -> Result<i64, String> {
         self.seek_word()?;
-        self.0.integer().ok_or_else(|| format!("expected a whole number, found {}", shown(self.0.word())))
+        self.0.integer().ok_or_else(|| expected("an integer", self.0.word()))
     }
 
     fn skip(&mut self, _: Scalar, count: usize) -> Result<(), String> {
@@ -64,12 +68,12 @@ impl Numbers for Ascii<'_> {
 
     fn end_item(&mut self) {
         match &mut self.1 {
-            Lines::EndItems(count, first) if self.0.skip_in_line() => {
+            LineEnds::EndItems(count, first) if self.0.skip_in_line() => {
                 *count += 1;
                 first.get_or_insert(self.0.at());
                 self.0.end_line();
             }
-            Lines::EndItems(..) | Lines::Blank => {}
+            LineEnds::EndItems(..) | LineEnds::Blank => {}
         }
     }
 
@@ -88,7 +92,7 @@ impl Numbers for Ascii<'_> {
     }
 }
 
-/// Bytes, the most significant first or last.
+/// Binary numbers, big-endian or little-endian.
 #[derive(Clone)]
 pub(super) struct Binary<'a, const BIG_ENDIAN: bool> {
     pub(super) bytes: &'a [u8],
@@ -99,7 +103,7 @@ impl<const BIG_ENDIAN: bool> Binary<'_, BIG_ENDIAN> {
     #[inline]
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let found = self.bytes.get(self.at..).and_then(|rest| rest.first_chunk::<N>());
-        let mut found = *found.ok_or_else(|| "the file ends here".to_owned())?;
+        let mut found = *found.ok_or_else(|| END_OF_FILE.to_owned())?;
         self.at += N;
         if BIG_ENDIAN {
             found.reverse();
@@ -135,7 +139,7 @@ impl<const BIG_ENDIAN: bool> Numbers for Binary<'_, BIG_ENDIAN> {
 
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String> {
         if !self.can_hold(scalar, count as u64) {
-            return Err("the file ends here".to_owned());
+            return Err(END_OF_FILE.to_owned());
         }
         self.at += count * scalar.size();
         Ok(())

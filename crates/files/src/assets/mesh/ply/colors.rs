@@ -1,22 +1,22 @@
-//! Colors of a PLY file, whose range depends on their type and on their greatest number.
+//! Colors of a PLY file, whose range depends on their type and on their largest value.
 
 use super::super::parsed::{ColorRange, color_bytes};
 use super::header::Scalar;
 
-/// Colors in the order of the file.
-pub(super) struct Colors {
+/// Colors in file order.
+pub(super) struct PlyColors {
     /// Types of red, green and blue.
     scalars: [Scalar; 3],
-    /// Colors whose parts are bytes.
+    /// Colors stored as bytes.
     bytes: Vec<[u8; 3]>,
-    /// All other colors.
+    /// Colors of all other types.
     numbers: Vec<[f64; 3]>,
     range: ColorRange,
-    /// Least alpha, its type, and the byte of its vertex.
+    /// Minimum alpha, its type, and a byte offset in its vertex.
     alpha: Option<(f64, Scalar, usize)>,
 }
 
-impl Colors {
+impl PlyColors {
     pub(super) fn new(scalars: [Scalar; 3]) -> Self {
         let (bytes, numbers) = Default::default();
         Self { scalars, bytes, numbers, range: ColorRange::default(), alpha: None }
@@ -31,26 +31,27 @@ impl Colors {
         }
     }
 
-    pub(super) fn alpha(&mut self, alpha: f64, scalar: Scalar, at: usize) {
+    pub(super) fn add_alpha(&mut self, alpha: f64, scalar: Scalar, at: usize) {
         if self.alpha.is_none_or(|(least, ..)| alpha < least) {
             self.alpha = Some((alpha, scalar, at));
         }
     }
 
-    /// The colors in bytes, and the byte of a vertex whose alpha is below 1.
+    /// Returns the colors as bytes, and a byte offset in the vertex with the minimum alpha if that is less than 1,
+    /// which is ignored.
     pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<usize>) {
         let one = |scalar: Scalar| match scalar {
-            Scalar::U8 | Scalar::I8 => scalar.greatest(),
+            Scalar::U8 | Scalar::I8 => scalar.full_intensity(),
             Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
-                let fits = |limit: &f64| self.range.greatest() <= *limit;
-                [255.0, 65535.0].into_iter().find(fits).unwrap_or(f64::INFINITY).min(scalar.greatest())
+                let fits = |limit: &f64| self.range.max() <= *limit;
+                [255.0, 65535.0].into_iter().find(fits).unwrap_or(f64::INFINITY).min(scalar.full_intensity())
             }
             Scalar::F32 | Scalar::F64 => self.range.one(),
         };
-        let translucent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar)).map(|(.., at)| at);
+        let transparent = self.alpha.filter(|(least, scalar, _)| *least < one(*scalar)).map(|(.., at)| at);
         let ones = self.scalars.map(one);
         let in_bytes = |color: &[f64; 3]| color_bytes(std::array::from_fn(|part| color[part] / ones[part]));
         let colors = self.numbers.iter().map(in_bytes);
-        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, translucent)
+        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, transparent)
     }
 }

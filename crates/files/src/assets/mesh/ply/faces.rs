@@ -1,79 +1,83 @@
-//! Faces with texture coordinates or colors of their own.
+//! Reads faces with per-face or per-corner texture coordinates or colors.
 
-use super::super::parsed::Parsed;
+use super::super::parsed::{FACE_COLORS_IGNORED, ParsedMesh};
 use super::body::Numbers;
-use super::colors::Colors;
-use super::header::{Element, Kind, Scalar};
-use super::{Place, corner, each, list_length, skip, slot};
+use super::colors::PlyColors;
+use super::header::{Element, PropertyType, Scalar};
+use super::{ErrorContext, corner, each, list_length, skip, slot};
 use crate::assets::AssetError;
 use crate::math::DVec2;
 
-/// Use of a property of a face.
+/// How a property of a face is used.
 #[derive(Clone, Copy, PartialEq)]
 enum Role {
     Corners,
-    /// Texture coordinates of the corners, or of the face.
+    /// List of texture coordinates, of the corners or of the face.
     Uvs,
-    /// Colors of the corners, or of the face.
+    /// List of colors, of the corners or of the face.
     Colors,
-    /// A number of the face: texture coordinates, color, or texture.
+    /// Scalar of the face, by its index in `FaceReader::values`: texture coordinate, color component or
+    /// texture number.
     Value(usize),
     Unused,
 }
 
-/// Places of the numbers of a face.
+/// Indices into `FaceReader::values`.
 const UV: [usize; 2] = [0, 1];
 const COLOR: [usize; 3] = [2, 3, 4];
 const TEXTURE: usize = 5;
 
-/// The use of each property. `corners` is the list of vertices.
-fn roles(element: &Element, corners: usize) -> Vec<(Kind, Role)> {
-    let role = |(index, kind, name): (usize, Kind, &str)| match (kind, name) {
+/// Returns type and role of each property. `corners` is the index of the vertex list.
+fn roles(element: &Element, corners: usize) -> Vec<(PropertyType, Role)> {
+    let role = |(index, kind, name): (usize, PropertyType, &str)| match (kind, name) {
         _ if index == corners => Role::Corners,
-        (Kind::List { .. }, "texcoord" | "texcoords" | "texture_coordinates" | "uv" | "uvs" | "st") => {
-            Role::Uvs
-        }
-        (Kind::List { .. }, "color" | "colors") => Role::Colors,
-        (Kind::One(_), "texnumber") => Role::Value(TEXTURE),
-        (Kind::One(_), _) => match slot(name) {
+        (
+            PropertyType::List { .. },
+            "texcoord" | "texcoords" | "texture_coordinates" | "uv" | "uvs" | "st",
+        ) => Role::Uvs,
+        (PropertyType::List { .. }, "color" | "colors") => Role::Colors,
+        (PropertyType::Scalar(_), "texnumber") => Role::Value(TEXTURE),
+        (PropertyType::Scalar(_), _) => match slot(name) {
             Some(uv @ 6..=7) => Role::Value(UV[uv - 6]),
             Some(color @ 8..=10) => Role::Value(COLOR[color - 8]),
             Some(_) | None => Role::Unused,
         },
-        (Kind::List { .. }, _) => Role::Unused,
+        (PropertyType::List { .. }, _) => Role::Unused,
     };
     let properties = element.properties.iter().enumerate();
-    properties.map(|(index, of)| (of.kind, role((index, of.kind, &of.name)))).collect()
+    properties
+        .map(|(index, property)| (property.kind, role((index, property.kind, &property.name))))
+        .collect()
 }
 
-/// Whether faces have more than vertices.
-pub(super) fn has_own(element: &Element, corners: usize) -> bool {
+/// Whether faces have texture coordinates, colors or texture numbers.
+pub(super) fn has_attributes(element: &Element, corners: usize) -> bool {
     roles(element, corners).iter().any(|(_, role)| ![Role::Corners, Role::Unused].contains(role))
 }
 
-/// Reads faces with texture coordinates or colors of their own.
+/// Reads faces with texture coordinates or colors.
 pub(super) fn read(
-    place: &Place<'_>,
+    context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,
     numbers: &mut impl Numbers,
     vertices: u64,
-    parsed: &mut Parsed,
+    parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let roles = roles(element, corners);
-    let mut faces = Faces::new(&roles);
-    each(place, element, numbers, |numbers| {
+    let mut faces = FaceReader::new(&roles);
+    each(context, element, numbers, |numbers| {
         let start = numbers.at();
         faces.read(&roles, numbers, vertices)?;
         faces.add(parsed, start);
         Ok(())
     })?;
-    faces.finish(place, parsed);
+    faces.finish(context, parsed);
     Ok(())
 }
 
-/// Numbers of the current face, and what all faces have.
-struct Faces {
+/// Values of the current face, and accumulated results.
+struct FaceReader {
     has_uvs: bool,
     has_uv: bool,
     has_color: bool,
@@ -81,29 +85,29 @@ struct Faces {
     uvs: Vec<f64>,
     parts: Vec<f64>,
     values: [f64; 6],
-    colors: Option<Colors>,
-    /// First texture, and whether another one occurs.
+    colors: Option<PlyColors>,
+    /// Texture number of the first face.
     texture: Option<f64>,
-    has_textures: bool,
-    /// Number of lists of a wrong length, and the number and place of the first of their faces.
+    has_several_textures: bool,
+    /// Number of faces with lists of a wrong length, and the index and byte offset of the first.
     wrong: u64,
     first_wrong: (usize, usize),
 }
 
-impl Faces {
-    fn new(roles: &[(Kind, Role)]) -> Self {
+impl FaceReader {
+    fn new(roles: &[(PropertyType, Role)]) -> Self {
         let has = |wanted: Role| roles.iter().any(|(_, role)| *role == wanted);
-        let has_value = |place: &usize| has(Role::Value(*place));
+        let has_value = |index: &usize| has(Role::Value(*index));
         let scalar = |wanted: Role| {
             roles.iter().find(|(_, role)| *role == wanted).map(|(kind, _)| match *kind {
-                Kind::One(scalar) | Kind::List { item: scalar, .. } => scalar,
+                PropertyType::Scalar(scalar) | PropertyType::List { item: scalar, .. } => scalar,
             })
         };
         let has_color = COLOR.iter().all(has_value);
-        let own = COLOR.map(|place| scalar(Role::Value(place)).unwrap_or(Scalar::U8));
+        let scalars = COLOR.map(|index| scalar(Role::Value(index)).unwrap_or(Scalar::U8));
         let colors = match scalar(Role::Colors) {
-            Some(scalar) => Some(Colors::new([scalar; 3])),
-            None => has_color.then(|| Colors::new(own)),
+            Some(scalar) => Some(PlyColors::new([scalar; 3])),
+            None => has_color.then(|| PlyColors::new(scalars)),
         };
         let has_uv = UV.iter().all(has_value);
         Self {
@@ -116,7 +120,7 @@ impl Faces {
             values: [0.0; 6],
             colors,
             texture: None,
-            has_textures: false,
+            has_several_textures: false,
             wrong: 0,
             first_wrong: (0, 0),
         }
@@ -124,7 +128,7 @@ impl Faces {
 
     fn read<N: Numbers>(
         &mut self,
-        roles: &[(Kind, Role)],
+        roles: &[(PropertyType, Role)],
         numbers: &mut N,
         vertices: u64,
     ) -> Result<(), String> {
@@ -133,18 +137,20 @@ impl Faces {
         self.parts.clear();
         for &(kind, role) in roles {
             match (kind, role) {
-                (Kind::List { count, item }, Role::Corners) => {
+                (PropertyType::List { count, item }, Role::Corners) => {
                     for _ in 0..list_length(numbers, count, item)? {
                         self.corners.push(corner(numbers.integer(item)?, vertices)?);
                     }
                 }
-                (Kind::List { count, item }, Role::Uvs | Role::Colors) => {
+                (PropertyType::List { count, item }, Role::Uvs | Role::Colors) => {
                     let list = if role == Role::Uvs { &mut self.uvs } else { &mut self.parts };
                     for _ in 0..list_length(numbers, count, item)? {
                         list.push(numbers.float(item)?);
                     }
                 }
-                (Kind::One(scalar), Role::Value(place)) => self.values[place] = numbers.float(scalar)?,
+                (PropertyType::Scalar(scalar), Role::Value(index)) => {
+                    self.values[index] = numbers.float(scalar)?
+                }
                 (_, Role::Corners | Role::Uvs | Role::Colors | Role::Value(_) | Role::Unused) => {
                     skip(numbers, kind)?;
                 }
@@ -153,11 +159,12 @@ impl Faces {
         Ok(())
     }
 
-    /// Adds the face that has been read.
-    fn add(&mut self, parsed: &mut Parsed, start: usize) {
+    /// Adds the current face to `parsed`.
+    fn add(&mut self, parsed: &mut ParsedMesh, start: usize) {
         let arity = self.corners.len();
-        let is_wrong =
-            |list: &[f64], sizes| !list.is_empty() && arity > 0 && own(list, arity, 0, sizes).is_none();
+        let is_wrong = |list: &[f64], sizes| {
+            !list.is_empty() && arity > 0 && corner_value(list, arity, 0, sizes).is_none()
+        };
         if is_wrong(&self.uvs, UV_SIZES) || is_wrong(&self.parts, COLOR_SIZES) {
             if self.wrong == 0 {
                 self.first_wrong = (parsed.faces.len(), start);
@@ -167,51 +174,58 @@ impl Faces {
         for (index, &vertex) in self.corners.iter().enumerate() {
             parsed.faces.corner(vertex);
             if self.has_uvs {
-                let of_face = if self.has_uv { UV.map(|place| self.values[place]) } else { [f64::NAN; 2] };
-                let own = own(&self.uvs, arity, index, UV_SIZES).and_then(|uv| uv.first_chunk());
-                parsed.corner_uvs.push(DVec2::from(*own.unwrap_or(&of_face)).as_vec2());
+                let of_face = if self.has_uv { UV.map(|index| self.values[index]) } else { [f64::NAN; 2] };
+                let of_corner =
+                    corner_value(&self.uvs, arity, index, UV_SIZES).and_then(|uv| uv.first_chunk());
+                parsed.corner_uvs.push(DVec2::from(*of_corner.unwrap_or(&of_face)).as_vec2());
             }
             if let Some(colors) = &mut self.colors {
-                // Faces without a color are white.
+                // Missing colors are white.
                 let of_face =
-                    if self.has_color { COLOR.map(|place| self.values[place]) } else { [f64::INFINITY; 3] };
-                let own = own(&self.parts, arity, index, COLOR_SIZES).and_then(|color| color.first_chunk());
-                colors.push(*own.unwrap_or(&of_face));
+                    if self.has_color { COLOR.map(|index| self.values[index]) } else { [f64::INFINITY; 3] };
+                let of_corner = corner_value(&self.parts, arity, index, COLOR_SIZES)
+                    .and_then(|color| color.first_chunk());
+                colors.push(*of_corner.unwrap_or(&of_face));
             }
         }
         parsed.faces.close(arity);
         let texture = self.values[TEXTURE];
-        self.has_textures |= *self.texture.get_or_insert(texture) != texture;
+        self.has_several_textures |= *self.texture.get_or_insert(texture) != texture;
     }
 
-    fn finish(self, place: &Place<'_>, parsed: &mut Parsed) {
+    fn finish(self, context: &ErrorContext<'_>, parsed: &mut ParsedMesh) {
         if self.wrong > 0 {
             let (face, start) = self.first_wrong;
-            let more = if self.wrong > 1 { format!(" and {} more", self.wrong - 1) } else { String::new() };
-            parsed.warnings.push(format!(
-                "{}{more}: the number of texture coordinates or colors does not fit the corners: ignored there",
-                place.of_face(start, face)
-            ));
+            let face = context.face_label(start, face);
+            parsed.warnings.push(wrong_list_length(&face, self.wrong));
         }
-        if self.has_textures {
-            let warning = "the faces have several textures (`texnumber`): all show those of one material";
-            parsed.warnings.push(warning.to_owned());
+        if self.has_several_textures {
+            parsed.warnings.push(SEVERAL_TEXTURES.to_owned());
         }
         let Some(colors) = self.colors else { return };
         if parsed.colors.is_empty() {
             (parsed.corner_colors, _) = colors.finish();
         } else {
-            parsed.warnings.push("the colors of the faces are ignored: the vertices have colors".to_owned());
+            parsed.warnings.push(FACE_COLORS_IGNORED.to_owned());
         }
     }
 }
 
-/// Numbers of texture coordinates or a color in a list.
+/// Warning about faces with different texture numbers.
+pub(super) const SEVERAL_TEXTURES: &str = "`texnumber` is ignored: all faces get the same material";
+
+/// Warning about `count` faces whose lists of texture coordinates or colors do not match their corners.
+pub(super) fn wrong_list_length(first: &str, count: u64) -> String {
+    let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
+    format!("{first}{more}: ignored texture coordinates or colors whose number does not match the corners")
+}
+
+/// Possible numbers of components of a texture coordinate or color in a list.
 const UV_SIZES: [usize; 2] = [2, 3];
 const COLOR_SIZES: [usize; 2] = [3, 4];
 
-/// The numbers of a corner in a list, which is for all corners in turn or for the whole face.
-fn own(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
+/// Returns the components of a corner from a list with a value per corner or a single value for the face.
+fn corner_value(list: &[f64], arity: usize, index: usize, sizes: [usize; 2]) -> Option<&[f64]> {
     match sizes.into_iter().find(|size| list.len() == size * arity) {
         Some(size) => list.get(index * size..),
         None => sizes.contains(&list.len()).then_some(list),

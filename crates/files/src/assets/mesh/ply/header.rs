@@ -1,9 +1,9 @@
-//! The header of a PLY file: its elements and their layout.
+//! Header of a PLY file: its elements and their properties.
 
-use super::super::text::shown;
-use super::super::{AssetError, Source};
+use super::super::text::{expected, shown};
+use super::super::{AssetError, MeshSource};
 
-/// Most bytes of a header; real ones have a few hundred.
+/// Maximum size of a header. Typical headers have a few hundred bytes.
 const HEADER_LIMIT: usize = 1 << 20;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ impl Scalar {
         })
     }
 
-    /// Bytes in a binary file.
+    /// Size in a binary file.
     pub(super) fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -50,8 +50,8 @@ impl Scalar {
         }
     }
 
-    /// The number that stands for 1 in a colour.
-    pub(super) fn greatest(self) -> f64 {
+    /// Color value of full intensity.
+    pub(super) fn full_intensity(self) -> f64 {
         match self {
             Self::I8 => f64::from(i8::MAX),
             Self::U8 => f64::from(u8::MAX),
@@ -63,21 +63,21 @@ impl Scalar {
         }
     }
 
-    pub(super) fn is_whole(self) -> bool {
+    pub(super) fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
-    One(Scalar),
+pub(super) enum PropertyType {
+    Scalar(Scalar),
     List { count: Scalar, item: Scalar },
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Property {
     pub(super) name: String,
-    pub(super) kind: Kind,
+    pub(super) kind: PropertyType,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,31 +88,33 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Fewest bytes of one such element; in text, a digit and a blank for each number.
+    /// Minimum size of one item. In text, a number takes a digit and a blank.
     pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
         let least = |property: &Property| match (encoding, property.kind) {
             (Encoding::Ascii, _) => 2,
-            (_, Kind::One(scalar) | Kind::List { count: scalar, .. }) => scalar.size() as u64,
+            (_, PropertyType::Scalar(scalar) | PropertyType::List { count: scalar, .. }) => {
+                scalar.size() as u64
+            }
         };
         self.properties.iter().map(least).sum()
     }
 }
 
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct PlyHeader {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// The warning of lines that were skipped.
+    /// Warning about skipped lines.
     pub(super) warning: Option<String>,
-    /// First byte behind the header.
+    /// Byte offset of the first byte after the header.
     pub(super) body: usize,
 }
 
-/// Words that begin the statements of a header.
-const STATEMENTS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
+/// Keywords of a header.
+const KEYWORDS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
 
-/// Reads the header.
-pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
+/// Parses the header.
+pub(super) fn parse(source: &MeshSource<'_>) -> Result<PlyHeader, AssetError> {
     let bytes = &source.bytes[..source.bytes.len().min(HEADER_LIMIT)];
     let mut at = 0;
     let mut lines = bytes.split_inclusive(|&byte| byte == b'\n').map(|line| {
@@ -124,12 +126,12 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
         Some((_, _, line)) if line.trim_ascii() == b"ply" => {}
         other => {
             let found = other.map_or(&[][..], |(_, _, line)| line.trim_ascii());
-            return Err(source.wrong_at(0, format!("expected ply, found {}", shown(found))));
+            return Err(source.wrong_at(0, expected("ply", found)));
         }
     }
     let mut encoding = None;
     let mut elements = Vec::new();
-    // Lines that the reader skips: their number, and the first with its word.
+    // Number of skipped lines, and a description of the first.
     let mut skipped = (0_u32, String::new());
     for (start, end, line) in lines {
         if end == HEADER_LIMIT && !line.ends_with(b"\n") {
@@ -139,37 +141,61 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
         let words: Vec<&str> = line.split_whitespace().collect();
         if words == ["end_header"] {
             let (count, first) = skipped;
-            let warning = match count {
-                0 => None,
-                1 => Some(format!("{first} is no statement of a PLY header: the line is skipped")),
-                _ => Some(format!(
-                    "{first} is no statement of a PLY header: the line and {} more are skipped",
-                    count - 1
-                )),
-            };
+            let warning = (count > 0).then(|| skipped_lines(&first, count));
             let encoding = encoding.ok_or_else(|| {
                 let hint = warning.iter().map(|warning| format!("; {warning}")).collect::<String>();
-                source.wrong_at(start, format!("the header has no format line{hint}"))
+                source.wrong_at(start, format!("{NO_FORMAT}{hint}"))
             })?;
-            return Ok(Header { encoding, elements, warning, body: end });
+            return Ok(PlyHeader { encoding, elements, warning, body: end });
         }
-        // Behind the first element, an unknown word may be a misspelt one of what the file holds.
-        if elements.is_empty() && words.first().is_some_and(|first| !STATEMENTS.contains(first)) {
+        // Do not skip unknown keywords after the first element: they may be misspelled properties.
+        if elements.is_empty() && words.first().is_some_and(|first| !KEYWORDS.contains(first)) {
             if skipped.0 == 0 {
-                skipped.1 = format!("line {}: {}", source.line(start), shown(words[0].as_bytes()));
+                skipped.1 = format!("line {}: {}", source.line(start), unknown_keyword(words[0]));
             }
             skipped.0 += 1;
             continue;
         }
         statement(&words, &mut encoding, &mut elements).map_err(|reason| source.wrong_at(start, reason))?;
     }
-    let reason = "the header has no end_header";
-    Err(source.wrong(if bytes.len() == source.bytes.len() {
-        reason.to_owned()
-    } else {
-        let limit = HEADER_LIMIT >> 20;
-        format!("{reason} in its first {limit} MiB, and no more than that is read of a header")
-    }))
+    Err(source.wrong(if bytes.len() == source.bytes.len() { NO_END.to_owned() } else { too_long() }))
+}
+
+pub(super) const NO_FORMAT: &str = "the header has no format line";
+pub(super) const NO_END: &str = "the header has no end_header";
+pub(super) const PROPERTY_FIRST: &str = "a property before the first element";
+
+/// Warning about `count` skipped lines; `first` describes the first.
+pub(super) fn skipped_lines(first: &str, count: u32) -> String {
+    match count {
+        1 => format!("{first}; line skipped"),
+        _ => format!("{first}; skipped this line and {} more", count - 1),
+    }
+}
+
+pub(super) fn too_long() -> String {
+    format!("{NO_END} in its first {} MiB, the size limit of a header", HEADER_LIMIT >> 20)
+}
+
+pub(super) fn unknown_keyword(found: &str) -> String {
+    format!("{} is not a PLY header keyword", shown(found.as_bytes()))
+}
+
+pub(super) fn invalid_statement(keyword: &str) -> String {
+    format!("incomplete or unknown statement {}", shown(keyword.as_bytes()))
+}
+
+pub(super) fn invalid_count(found: &str, element: &str) -> String {
+    format!("{} is not a valid number of {element}", shown(found.as_bytes()))
+}
+
+pub(super) fn unknown_type(found: &str) -> String {
+    format!("{} is not a PLY type", shown(found.as_bytes()))
+}
+
+pub(super) fn unknown_encoding(found: &str) -> String {
+    let found = shown(found.as_bytes());
+    format!("the format must be ascii, binary_little_endian or binary_big_endian, not {found}")
 }
 
 fn statement(
@@ -181,20 +207,19 @@ fn statement(
         [] | ["comment" | "obj_info", ..] => {}
         ["format", name, ..] => *encoding = Some(named_encoding(name)?),
         ["element", name, count] => {
-            let count =
-                count.parse().map_err(|_| format!("{} is no number of {name}", shown(count.as_bytes())))?;
+            let count = count.parse().map_err(|_| invalid_count(count, name))?;
             elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
         }
         ["property", ref words @ ..] => {
-            let element = elements.last_mut().ok_or("a property before the first element")?;
+            let element = elements.last_mut().ok_or(PROPERTY_FIRST)?;
             let property = property(words)?;
             if element.properties.iter().any(|known| known.name == property.name) {
-                let (name, of) = (shown(property.name.as_bytes()), shown(element.name.as_bytes()));
-                return Err(format!("the property {name} of {of} is there twice"));
+                let (name, element) = (shown(property.name.as_bytes()), shown(element.name.as_bytes()));
+                return Err(format!("duplicate property {name} in element {element}"));
             }
             element.properties.push(property);
         }
-        [first, ..] => return Err(format!("{} is no statement of a PLY header", shown(first.as_bytes()))),
+        [first, ..] => return Err(invalid_statement(first)),
     }
     Ok(())
 }
@@ -204,26 +229,21 @@ fn named_encoding(name: &str) -> Result<Encoding, String> {
         "ascii" => Ok(Encoding::Ascii),
         "binary_little_endian" => Ok(Encoding::LittleEndian),
         "binary_big_endian" => Ok(Encoding::BigEndian),
-        _ => Err(format!(
-            "the format is ascii, binary_little_endian or binary_big_endian, not {}",
-            shown(name.as_bytes())
-        )),
+        _ => Err(unknown_encoding(name)),
     }
 }
 
 fn property(words: &[&str]) -> Result<Property, String> {
-    let scalar = |name: &str| {
-        Scalar::named(name).ok_or_else(|| format!("{} is no type of PLY", shown(name.as_bytes())))
-    };
+    let scalar = |name: &str| Scalar::named(name).ok_or_else(|| unknown_type(name));
     let (kind, name) = match *words {
         ["list", count, item, name] => {
             let count = scalar(count)?;
-            if !count.is_whole() {
-                return Err("the length of a list is a whole number".to_owned());
+            if !count.is_integer() {
+                return Err("the length of a list must have an integer type".to_owned());
             }
-            (Kind::List { count, item: scalar(item)? }, name)
+            (PropertyType::List { count, item: scalar(item)? }, name)
         }
-        [kind, name] => (Kind::One(scalar(kind)?), name),
+        [kind, name] => (PropertyType::Scalar(scalar(kind)?), name),
         _ => return Err("expected `property type name` or `property list type type name`".to_owned()),
     };
     Ok(Property { name: name.to_owned(), kind })

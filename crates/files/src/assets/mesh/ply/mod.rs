@@ -1,5 +1,5 @@
-//! PLY (Turk, *The PLY Polygon File Format*, 1994): text and binary in both byte orders, any types, any further
-//! properties and elements.
+//! PLY (Turk, *The PLY Polygon File Format*, 1994): text and binary of both byte orders, all types, and
+//! unknown properties and elements.
 
 mod body;
 mod colors;
@@ -8,18 +8,18 @@ mod header;
 pub mod write;
 
 use super::assemble::assemble_text;
-use super::parsed::Parsed;
+use super::parsed::{ALPHA_IGNORED, ParsedMesh};
 use super::text::Cursor;
-use super::{AssetError, LoadedMesh, Source};
+use super::{AssetError, LoadedMesh, MeshSource, vertex_out_of_range};
 use crate::math::{DVec2, DVec3};
-use body::{Ascii, Binary, Lines, Numbers};
-use colors::Colors;
-use header::{Element, Encoding, Header, Kind, Scalar};
+use body::{Ascii, Binary, LineEnds, Numbers};
+use colors::PlyColors;
+use header::{Element, Encoding, PlyHeader, PropertyType, Scalar};
 
-/// Elements between two polls of the token.
+/// Items of an element between two polls of the cancel token.
 const BATCH: u64 = 1 << 14;
 
-pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
+pub(super) fn parse(source: &MeshSource<'_>) -> Result<LoadedMesh, AssetError> {
     source.tick(0)?;
     let header = header::parse(source)?;
     let (bytes, at) = (source.bytes, header.body);
@@ -30,88 +30,89 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     }
 }
 
-/// Reads a text word by word, whatever its lines. If that fails or does not reach its end, lines may have values that the header does
-/// not name: then an item a line.
-fn read_text(source: &Source<'_>, header: &Header) -> Result<LoadedMesh, AssetError> {
+/// Reads a text file, ignoring line ends. If that fails or leaves words unread, lines may have undeclared
+/// values: reads it again with one item per line.
+fn read_text(source: &MeshSource<'_>, header: &PlyHeader) -> Result<LoadedMesh, AssetError> {
     let cursor = Cursor::new(source.bytes, header.body);
-    let mut words = Ascii(cursor, Lines::Blank);
+    let mut words = Ascii(cursor, LineEnds::Blank);
     let by_words = read(source, header, &mut words);
-    source.watch.token.check()?;
+    source.monitor.token.check()?;
     if by_words.is_ok() && !words.0.skip_blank() {
         return by_words;
     }
-    let mut lines = Ascii(cursor, Lines::EndItems(0, None));
+    let mut lines = Ascii(cursor, LineEnds::EndItems(0, None));
     let by_lines = read(source, header, &mut lines);
     match (by_lines, lines.1) {
-        (Ok(mut loaded), Lines::EndItems(count, Some(first))) => {
+        (Ok(mut loaded), LineEnds::EndItems(count, Some(first))) => {
             let line = source.line(first);
-            let lines = match count {
-                1 => format!("line {line} has"),
-                _ => format!("line {line} and {} more have", count - 1),
-            };
-            let warning = format!("{lines} more values than the header names: those are left out");
-            loaded.warnings.push(warning);
+            loaded.warnings.push(undeclared_values(line, count));
             Ok(loaded)
         }
-        // A file with such lines that is wrong in another way too: its words would be taken for others.
-        (Err(error), Lines::EndItems(_, Some(_))) => Err(error),
-        (Ok(_) | Err(_), Lines::EndItems(_, None) | Lines::Blank) => by_words,
+        // Return the error of the second pass: a faulty file with undeclared values makes no sense word by
+        // word.
+        (Err(error), LineEnds::EndItems(_, Some(_))) => Err(error),
+        (Ok(_) | Err(_), LineEnds::EndItems(_, None) | LineEnds::Blank) => by_words,
     }
 }
 
-/// Place of a fault in the file.
-struct Place<'a> {
-    source: &'a Source<'a>,
+/// Adds the position in the file to errors.
+struct ErrorContext<'a> {
+    source: &'a MeshSource<'a>,
     encoding: Encoding,
 }
 
-impl Place<'_> {
-    /// An error at a place: text has lines, binary files have numbered elements.
+impl ErrorContext<'_> {
+    /// An error of an item, with its line in a text file, or its number in a binary file.
     fn wrong(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
-        let reason = format!("{} {}: {reason}", element.name, index + 1);
+        let reason = item_error(&element.name, index + 1, reason);
         match self.encoding {
             Encoding::Ascii => self.source.wrong_at(at, reason),
             _ => self.source.wrong(reason),
         }
     }
 
-    /// The line of a byte as the start of a message; nothing in binary files.
-    fn line(&self, at: usize) -> String {
+    /// Start of a message about a line. Empty for a binary file.
+    fn line_prefix(&self, at: usize) -> String {
         match self.encoding {
             Encoding::Ascii => format!("line {}: ", self.source.line(at)),
             Encoding::LittleEndian | Encoding::BigEndian => String::new(),
         }
     }
 
-    /// A face in words, with its line in a text.
-    fn of_face(&self, at: usize, index: usize) -> String {
-        format!("{}face {}", self.line(at), index + 1)
+    /// Name of a face in warnings, with its line in a text file.
+    fn face_label(&self, at: usize, index: usize) -> String {
+        format!("{}face {}", self.line_prefix(at), index + 1)
     }
 }
 
-fn read(source: &Source<'_>, header: &Header, numbers: &mut impl Numbers) -> Result<LoadedMesh, AssetError> {
-    let place = Place { source, encoding: header.encoding };
+fn read(
+    source: &MeshSource<'_>,
+    header: &PlyHeader,
+    numbers: &mut impl Numbers,
+) -> Result<LoadedMesh, AssetError> {
+    let context = ErrorContext { source, encoding: header.encoding };
     let count_of =
         |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
     let vertices = count_of("vertex");
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
-        return Err(source.wrong(format!("{vertices} vertices are too many, or in more than one element")));
+        return Err(source.wrong(format!("too many vertices ({vertices}), or more than one vertex element")));
     }
-    // Strips repeat what faces say, if there are faces.
+    // Ignore strips if there are faces, which repeat them.
     let has_faces = count_of("face") > 0;
-    let mut parsed = Parsed { warnings: header.warning.iter().cloned().collect(), ..Parsed::default() };
+    let mut parsed =
+        ParsedMesh { warnings: header.warning.iter().cloned().collect(), ..ParsedMesh::default() };
     let mut before_faces = None;
     for element in &header.elements {
         plausible(source, element, header.encoding, numbers.at())?;
         match element.name.as_str() {
-            "vertex" => read_vertices(&place, element, numbers, &mut parsed)?,
+            "vertex" => read_vertices(&context, element, numbers, &mut parsed)?,
             "face" => {
                 before_faces.get_or_insert((element, numbers.clone()));
-                read_faces(&place, element, numbers, vertices, &mut parsed)?;
+                read_faces(&context, element, numbers, vertices, &mut parsed)?;
             }
-            "tristrips" if !has_faces => read_strips(&place, element, numbers, vertices, &mut parsed)?,
+            "tristrips" if !has_faces => read_strips(&context, element, numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
-            _ => each(&place, element, numbers, |numbers| {
+            _ => each(&context, element, numbers, |numbers| {
                 element.properties.iter().try_for_each(|property| skip(numbers, property.kind))
             })?,
         }
@@ -119,15 +120,15 @@ fn read(source: &Source<'_>, header: &Header, numbers: &mut impl Numbers) -> Res
     let start_of = |face: usize| {
         let (element, mut numbers) = before_faces.clone().filter(|_| header.encoding == Encoding::Ascii)?;
         let earlier = Element { count: face as u64, ..element.clone() };
-        read_faces(&place, &earlier, &mut numbers, vertices, &mut Parsed::default()).ok()?;
+        read_faces(&context, &earlier, &mut numbers, vertices, &mut ParsedMesh::default()).ok()?;
         Some(numbers.start())
     };
     assemble_text(source, parsed, start_of)
 }
 
-/// Refuses a header that claims more than the file can hold, before anything is allocated.
+/// Rejects a header that claims more than the file can hold, before anything is allocated.
 fn plausible(
-    source: &Source<'_>,
+    source: &MeshSource<'_>,
     element: &Element,
     encoding: Encoding,
     at: usize,
@@ -135,34 +136,63 @@ fn plausible(
     let needed = element.count.saturating_mul(element.least_bytes(encoding));
     let remaining = (source.bytes.len() - at) as u64;
     if needed > remaining + 1 {
-        let Element { name, count, .. } = element;
-        let claim = format!("the header claims {count} times the element `{name}`");
-        return Err(source.wrong(format!("{claim}, and only {remaining} bytes follow")));
+        return Err(source.wrong(implausible(&element.name, element.count, remaining)));
     }
     Ok(())
 }
 
+fn item_error(element: &str, number: u64, reason: &str) -> String {
+    format!("{element} {number}: {reason}")
+}
+
+fn implausible(element: &str, count: u64, remaining: u64) -> String {
+    format!("the header claims {count} of element `{element}`, but only {remaining} bytes follow")
+}
+
+/// Warning about `count` lines with more values than properties.
+fn undeclared_values(first: usize, count: u64) -> String {
+    let lines = match count {
+        1 => format!("line {first}"),
+        _ => format!("line {first} and {} more", count - 1),
+    };
+    format!("{lines}: ignored values that the header does not declare")
+}
+
+fn list_too_long(length: i64) -> String {
+    format!("a list claims {length} items, more than the file can hold")
+}
+
+fn negative_length(length: i64) -> String {
+    format!("negative list length {length}")
+}
+
+const NO_POSITIONS: &str = "the vertices need properties x, y and z";
+
+fn no_vertex_list(element: &str) -> String {
+    format!("the element `{element}` needs an integer list `vertex_indices`")
+}
+
 /// Reads all items of an element.
 fn each<N: Numbers>(
-    place: &Place<'_>,
+    context: &ErrorContext<'_>,
     element: &Element,
     numbers: &mut N,
-    mut one: impl FnMut(&mut N) -> Result<(), String>,
+    mut read_item: impl FnMut(&mut N) -> Result<(), String>,
 ) -> Result<(), AssetError> {
     for index in 0..element.count {
         if index % BATCH == 0 {
-            place.source.tick(numbers.at())?;
+            context.source.tick(numbers.at())?;
         }
-        one(numbers).map_err(|reason| place.wrong(numbers.at(), element, index, &reason))?;
+        read_item(numbers).map_err(|reason| context.wrong(numbers.at(), element, index, &reason))?;
         numbers.end_item();
     }
     Ok(())
 }
 
-fn skip(numbers: &mut impl Numbers, kind: Kind) -> Result<(), String> {
+fn skip(numbers: &mut impl Numbers, kind: PropertyType) -> Result<(), String> {
     match kind {
-        Kind::One(scalar) => numbers.skip(scalar, 1),
-        Kind::List { count, item } => {
+        PropertyType::Scalar(scalar) => numbers.skip(scalar, 1),
+        PropertyType::List { count, item } => {
             let length = list_length(numbers, count, item)?;
             numbers.skip(item, length)
         }
@@ -173,15 +203,16 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
     let length = numbers.integer(count)?;
     match u64::try_from(length) {
         Ok(fits) if numbers.can_hold(item, fits) => Ok(fits as usize),
-        Ok(_) => Err(format!("it claims {length} corners, more than the file can hold")),
-        Err(_) => Err(format!("the length of a list is {length}")),
+        Ok(_) => Err(list_too_long(length)),
+        Err(_) => Err(negative_length(length)),
     }
 }
 
-/// Slot of the alpha of a vertex.
+/// Slot of a vertex's alpha.
 const ALPHA: usize = 13;
 
-/// Slot of a vertex value: position, normal, texture coordinates, color, second set of coordinates, alpha. `None` for other properties.
+/// Slot of a vertex property: position, normal, texture coordinates, color, second texture coordinates or
+/// alpha. `None` for unknown properties.
 fn slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
@@ -203,42 +234,44 @@ fn slot(name: &str) -> Option<usize> {
 }
 
 fn read_vertices(
-    place: &Place<'_>,
+    context: &ErrorContext<'_>,
     element: &Element,
     numbers: &mut impl Numbers,
-    parsed: &mut Parsed,
+    parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
-    let target = |kind: Kind, name: &str| if matches!(kind, Kind::One(_)) { slot(name) } else { None };
-    let layout: Vec<(Kind, Option<usize>)> = element
+    let target = |kind: PropertyType, name: &str| {
+        if matches!(kind, PropertyType::Scalar(_)) { slot(name) } else { None }
+    };
+    let layout: Vec<(PropertyType, Option<usize>)> = element
         .properties
         .iter()
         .map(|property| (property.kind, target(property.kind, &property.name)))
         .collect();
     let has = |slots: &[usize]| slots.iter().all(|slot| layout.iter().any(|(_, to)| *to == Some(*slot)));
     if !has(&[0, 1, 2]) {
-        return Err(place.source.wrong("the vertices have no x, y and z"));
+        return Err(context.source.wrong(NO_POSITIONS));
     }
     let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
     let has_second_uvs = has(&[11, 12]);
     let scalar = |slot: usize| {
         layout.iter().find_map(|(kind, to)| match *kind {
-            Kind::One(scalar) if *to == Some(slot) => Some(scalar),
-            Kind::One(_) | Kind::List { .. } => None,
+            PropertyType::Scalar(scalar) if *to == Some(slot) => Some(scalar),
+            PropertyType::Scalar(_) | PropertyType::List { .. } => None,
         })
     };
     let mut colors =
-        has_colors.then(|| Colors::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(Scalar::U8))));
+        has_colors.then(|| PlyColors::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(Scalar::U8))));
     let alpha_scalar = scalar(ALPHA);
     let count = element.count as usize;
     parsed.positions.reserve(count);
     parsed.normals.reserve(if has_normals { count } else { 0 });
     parsed.uvs.reserve(if has_uvs { count } else { 0 });
     parsed.second_uvs.reserve(if has_second_uvs { count } else { 0 });
-    each(place, element, numbers, |numbers| {
+    each(context, element, numbers, |numbers| {
         let mut values = [0.0; 14];
         for &(kind, slot) in &layout {
             match (kind, slot) {
-                (Kind::One(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
+                (PropertyType::Scalar(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
                 _ => skip(numbers, kind)?,
             }
         }
@@ -256,37 +289,35 @@ fn read_vertices(
         if let Some(colors) = &mut colors {
             colors.push([red, green, blue]);
             if let Some(scalar) = alpha_scalar {
-                colors.alpha(alpha, scalar, numbers.at());
+                colors.add_alpha(alpha, scalar, numbers.at());
             }
         }
         Ok(())
     })?;
     if let Some(colors) = colors {
-        let (colors, translucent) = colors.finish();
+        let (colors, transparent) = colors.finish();
         parsed.colors = colors;
-        parsed
-            .warnings
-            .extend(translucent.map(|at| format!("{}the alpha of the colors is ignored", place.line(at))));
+        parsed.warnings.extend(transparent.map(|at| format!("{}{ALPHA_IGNORED}", context.line_prefix(at))));
     }
     Ok(())
 }
 
 fn read_faces(
-    place: &Place<'_>,
+    context: &ErrorContext<'_>,
     element: &Element,
     numbers: &mut impl Numbers,
     vertices: u64,
-    parsed: &mut Parsed,
+    parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = corners_of(element) else {
-        return Err(place.source.wrong("the faces have no list of whole numbers `vertex_indices`"));
+        return Err(context.source.wrong(no_vertex_list(&element.name)));
     };
-    if faces::has_own(element, corners) {
-        return faces::read(place, element, corners, numbers, vertices, parsed);
+    if faces::has_attributes(element, corners) {
+        return faces::read(context, element, corners, numbers, vertices, parsed);
     }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
-    each_list(place, element, corners, numbers, |numbers, item, length| {
+    each_list(context, element, corners, numbers, |numbers, item, length| {
         for _ in 0..length {
             faces.corner(corner(numbers.integer(item)?, vertices)?);
         }
@@ -295,20 +326,20 @@ fn read_faces(
     })
 }
 
-/// Reads triangle strips: each vertex makes a triangle with the two before it, every second one turned around. −1 ends a strip
-/// within a list; a vertex that is repeated joins strips and makes no triangle.
+/// Reads triangle strips: each vertex forms a triangle with the previous two, with alternating orientation.
+/// −1 restarts the strip within a list; repeated vertices join strips without adding triangles.
 fn read_strips(
-    place: &Place<'_>,
+    context: &ErrorContext<'_>,
     element: &Element,
     numbers: &mut impl Numbers,
     vertices: u64,
-    parsed: &mut Parsed,
+    parsed: &mut ParsedMesh,
 ) -> Result<(), AssetError> {
     let Some(corners) = corners_of(element) else {
-        return Err(place.source.wrong("the strips have no list of whole numbers `vertex_indices`"));
+        return Err(context.source.wrong(no_vertex_list(&element.name)));
     };
     let faces = &mut parsed.faces;
-    each_list(place, element, corners, numbers, |numbers, item, length| {
+    each_list(context, element, corners, numbers, |numbers, item, length| {
         let (mut before, mut count) = ([0; 2], 0_usize);
         for _ in 0..length {
             let vertex = numbers.integer(item)?;
@@ -329,33 +360,33 @@ fn read_strips(
     })
 }
 
-/// The property that lists the vertices of a face or a strip.
+/// Index of the property that lists the vertices of a face or a strip.
 fn corners_of(element: &Element) -> Option<usize> {
     let is_named = |name: &str| ["vertex_indices", "vertex_index"].contains(&name);
     let corners = element.properties.iter().position(|property| is_named(&property.name));
     corners
-        .filter(|&place| matches!(element.properties[place].kind, Kind::List { item, .. } if item.is_whole()))
+        .filter(|&index| matches!(element.properties[index].kind, PropertyType::List { item, .. } if item.is_integer()))
 }
 
-/// The vertex of this number.
+/// Converts a vertex index to `u32` and checks its range.
 fn corner(vertex: i64, vertices: u64) -> Result<u32, String> {
     match u32::try_from(vertex) {
         Ok(fits) if u64::from(fits) < vertices => Ok(fits),
-        Ok(_) | Err(_) => Err(format!("vertex {vertex} is out of range: there are {vertices}, from 0")),
+        Ok(_) | Err(_) => Err(vertex_out_of_range(vertex, vertices)),
     }
 }
 
-/// Reads all items of an element; `read` takes their lists at `corners`, by the type and number of their items.
+/// Reads all items of an element. `read` gets the type and length of the list at property `corners`.
 fn each_list<N: Numbers>(
-    place: &Place<'_>,
+    context: &ErrorContext<'_>,
     element: &Element,
     corners: usize,
     numbers: &mut N,
     mut read: impl FnMut(&mut N, Scalar, usize) -> Result<(), String>,
 ) -> Result<(), AssetError> {
-    each(place, element, numbers, |numbers| {
+    each(context, element, numbers, |numbers| {
         for (index, property) in element.properties.iter().enumerate() {
-            let Kind::List { count, item } = property.kind else {
+            let PropertyType::List { count, item } = property.kind else {
                 skip(numbers, property.kind)?;
                 continue;
             };

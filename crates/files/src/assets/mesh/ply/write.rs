@@ -1,9 +1,9 @@
-//! Meshes as PLY files, little endian, which give the same mesh when they are read.
+//! Writes meshes as little-endian PLY files, which are read back as the same mesh.
 
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
 
-/// The bytes of a PLY file of a mesh, without materials.
+/// Encodes a mesh as PLY, without materials.
 pub fn bytes(mesh: &TriangleMesh) -> Vec<u8> {
     let is_far = mesh.origin != DVec3::ZERO;
     let place = if is_far { "double" } else { "float" };

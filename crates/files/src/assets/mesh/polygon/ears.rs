@@ -1,28 +1,30 @@
-//! Ear clipping (Meisters, *Polygons Have Ears*, American Mathematical Monthly 1975) for polygons that may touch themselves: holes
-//! joined to the outline by an edge in both directions, corners visited twice, corners on other edges.
+//! Ear clipping (Meisters, *Polygons Have Ears*, American Mathematical Monthly 1975) for polygons that may
+//! touch themselves: holes connected to the outline by an edge in both directions, repeated corners, corners
+//! on other edges.
 
 use std::collections::VecDeque;
 
-use super::tree::{Tree, turn};
+use super::tree::{CornerTree, turn};
 use crate::math::DVec2;
 
-/// Visits of corners and nodes of the tree that a polygon may take, per corner and at least. Simple polygons take about 50 per
-/// corner; beyond the limit ears are no longer tested, as for polygons that wind around the same corners many times.
+/// Limit on visits of corners and tree nodes: per corner, plus a constant. Simple polygons take about 50 per
+/// corner. Beyond the limit, ears are no longer tested; this happens for polygons that wind around the same
+/// corners many times.
 const VISITS_PER_CORNER: u64 = 200;
-const LEAST_VISITS: u64 = 1_000_000;
+const EXTRA_VISITS: u64 = 1_000_000;
 
-/// No corner, or one that has been clipped.
+/// No corner, or a corner that has been clipped.
 const NONE: u32 = u32::MAX;
 
-/// Cuts a counterclockwise polygon into triangles. Returns whether all of it could be cut along diagonals; a polygon that crosses
-/// itself cannot.
+/// Triangulates a counterclockwise polygon. Returns whether it could be cut along diagonals only, which is
+/// not the case for self-intersecting polygons.
 pub(super) fn clip(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
     Clipper::new(points, emit).run()
 }
 
-/// Whether a polygon could be cut along diagonals, and the number of visits that this took.
+/// Returns whether the polygon could be cut along diagonals, and the number of visits.
 #[cfg(test)]
-pub(super) fn counted(points: &[DVec2]) -> (bool, u64) {
+pub(super) fn count_visits(points: &[DVec2]) -> (bool, u64) {
     let mut clipper = Clipper::new(points, |_| {});
     (clipper.run(), clipper.visits)
 }
@@ -33,15 +35,15 @@ struct Clipper<'a, F> {
     next: Vec<u32>,
     previous: Vec<u32>,
     remaining: usize,
-    tree: Tree,
-    /// Corners to test, with their stamps; entries with an old stamp are skipped.
+    tree: CornerTree,
+    /// Corners to test, with their stamps. Entries with an old stamp are skipped.
     queue: VecDeque<(u32, u32)>,
     stamps: Vec<u32>,
-    /// Corners that a corner keeps from being ears, with their stamps, as a list in `waiting`.
+    /// For each corner, the head of the list in `waiting` of the corners that it blocks.
     first_waiting: Vec<u32>,
     waiting: Vec<(u32, u32, u32)>,
     visits: u64,
-    most_visits: u64,
+    max_visits: u64,
 }
 
 impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
@@ -53,13 +55,13 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
             next: (1..count).chain([0]).collect(),
             previous: [count - 1].into_iter().chain(0..count - 1).collect(),
             remaining: points.len(),
-            tree: Tree::new(points),
+            tree: CornerTree::new(points),
             queue: (0..count).map(|corner| (corner, 0)).collect(),
             stamps: vec![0; points.len()],
             first_waiting: vec![NONE; points.len()],
             waiting: Vec::new(),
             visits: 0,
-            most_visits: VISITS_PER_CORNER * u64::from(count) + LEAST_VISITS,
+            max_visits: VISITS_PER_CORNER * u64::from(count) + EXTRA_VISITS,
         }
     }
 
@@ -67,19 +69,21 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         let mut is_simple = true;
         while self.remaining > 2 {
             self.clip_queued();
-            if self.remaining <= 2 || self.clip_first(|own, corner| own.blocker(corner, true).is_none()) {
+            if self.remaining <= 2
+                || self.clip_first(|clipper, corner| clipper.blocker(corner, true).is_none())
+            {
                 continue;
             }
             is_simple = false;
-            // Clip any convex corner; if there are none, the rest has no area of the polygon's orientation.
+            // Clip any convex corner. Without one, the rest has no positive area.
             if !self.clip_first(|_, _| true) {
                 break;
             }
         }
-        is_simple && self.visits <= self.most_visits
+        is_simple && self.visits <= self.max_visits
     }
 
-    /// Clips ears until no queued corner is one.
+    /// Clips ears until the queue is empty.
     fn clip_queued(&mut self) {
         while let Some((corner, stamp)) = self.queue.pop_front() {
             if self.stamps[corner as usize] != stamp || self.remaining <= 2 {
@@ -123,13 +127,13 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         turn(a, b, c) > 0.0
     }
 
-    /// Whether the outline turns back at a corner.
+    /// Whether the outline reverses its direction at a corner.
     fn is_spike(&self, corner: u32) -> bool {
         let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
         turn(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
     }
 
-    /// Emits the triangle of a corner, if it has an area, and removes the corner.
+    /// Removes a corner, and emits its triangle if that has an area.
     fn clip(&mut self, corner: u32) {
         let [a, b, c] = self.around(corner);
         if self.is_convex(b) {
@@ -149,7 +153,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         }
     }
 
-    /// Queues a corner behind the others, which alternates clipped corners and keeps triangles from becoming slivers.
+    /// Queues a corner last, which spreads the clipping along the outline and avoids slivers.
     fn enqueue(&mut self, corner: u32) {
         let stamp = &mut self.stamps[corner as usize];
         *stamp += 1;
@@ -162,22 +166,23 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         *first = (self.waiting.len() - 1) as u32;
     }
 
-    /// Queues the corners that waited for this one.
+    /// Queues the corners blocked by `blocker`.
     fn wake(&mut self, blocker: u32) {
-        let mut place = std::mem::replace(&mut self.first_waiting[blocker as usize], NONE);
-        while place != NONE {
-            let (corner, stamp, next) = self.waiting[place as usize];
+        let mut entry = std::mem::replace(&mut self.first_waiting[blocker as usize], NONE);
+        while entry != NONE {
+            let (corner, stamp, next) = self.waiting[entry as usize];
             if self.stamps[corner as usize] == stamp {
                 self.enqueue(corner);
             }
-            place = next;
+            entry = next;
         }
     }
 
-    /// A corner that keeps a convex corner from being an ear: the outline enters the triangle there. Unless `may_touch`, a corner on the
-    /// diagonal also does, as the triangles on its two sides would not share their vertices.
+    /// Finds a corner that prevents a convex corner from being an ear because the outline enters its triangle
+    /// there. Unless `may_touch`, corners on the diagonal also block, because the triangles on its two sides
+    /// would not share these vertices.
     fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
-        if self.visits > self.most_visits {
+        if self.visits > self.max_visits {
             return None;
         }
         let around = self.around(corner);
@@ -192,7 +197,8 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         found
     }
 
-    /// Whether the outline enters the interior of a triangle at this corner, or the corner is on the diagonal.
+    /// Whether the outline enters the interior of a triangle at this corner, or (unless `may_touch`) the
+    /// corner lies on the diagonal.
     fn is_entered(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
         let [a, _, c] = triangle;
         let point = self.point(corner);
@@ -203,7 +209,8 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
         if !may_touch && turns[2] == 0.0 && point != a && point != c {
             return true;
         }
-        // Beside the sides on which the corner is, its neighbors are on the inner side.
+        // The corner may be on some sides of the triangle. A neighbor enters the triangle if it is on the inner
+        // side of all of them.
         [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
             let sides = self::turns(triangle, self.point(neighbor));
             (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)
@@ -211,7 +218,7 @@ impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
     }
 }
 
-/// The turn to a point from each side of a triangle.
+/// Orientation of a point relative to each side of a triangle.
 fn turns([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
     [turn(a, b, point), turn(b, c, point), turn(c, a, point)]
 }

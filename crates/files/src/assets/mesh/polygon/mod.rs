@@ -1,12 +1,13 @@
-//! Polygons → triangles. Convex ones become fans; ears are clipped from the others.
+//! Triangulates polygons: convex ones as fans, others by ear clipping.
 
 mod ears;
 mod tree;
 
 use crate::math::{DVec2, DVec3, Vec3};
 
-/// Cuts a polygon of at least 3 finite points into triangles of indices into it, with the same orientation. Returns whether the
-/// triangles cover it exactly once; a polygon that crosses itself is cut as well as possible.
+/// Triangulates a polygon of at least 3 finite points. Emits triangles as indices of its corners, with the
+/// same orientation. Returns whether the triangles cover it exactly once; self-intersecting polygons are cut
+/// as well as possible.
 pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> bool {
     let points: Vec<DVec3> = points.iter().map(|point| point.as_dvec3()).collect();
     let normal = newell_normal(&points);
@@ -25,7 +26,7 @@ pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> 
     }
 }
 
-/// The points without the coordinate along which the normal is longest, in counterclockwise order. This rounds nothing.
+/// Projects the points along the largest component of the normal, in counterclockwise order. This is exact.
 fn projected(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     let axis = normal.abs().max_position();
     let (first, second) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -33,7 +34,7 @@ fn projected(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
     points.iter().map(|point| DVec2::new(point[x], point[y])).collect()
 }
 
-/// The sum of the fan's normals, which is the same for every origin (Newell's method).
+/// The sum of the fan's normals, which is independent of the origin (Newell's method).
 fn newell_normal(points: &[DVec3]) -> DVec3 {
     let origin = points[0];
     points.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum()

@@ -2,7 +2,7 @@ use super::*;
 
 type Points = Vec<(f32, f32)>;
 
-/// Cuts a polygon in a plane of every tilt, checks the triangles against the outline, and returns those in the plane y = 7.
+/// Triangulates a polygon in two planes, checks the triangles, and returns the ones of the plane y = 7.
 fn cut(points: &[(f32, f32)]) -> Vec<[usize; 3]> {
     let upright: Vec<Vec3> = points.iter().map(|&(x, y)| Vec3::new(x, 7.0, -y)).collect();
     let triangles = covering(&upright, points);
@@ -11,28 +11,28 @@ fn cut(points: &[(f32, f32)]) -> Vec<[usize; 3]> {
     triangles
 }
 
-/// The triangles, which together have the area of the polygon and none of which is turned around.
+/// Triangulates a polygon and checks that the triangles have its orientation and total area.
 fn covering(space: &[Vec3], points: &[(f32, f32)]) -> Vec<[usize; 3]> {
     let mut triangles = Vec::new();
     assert!(triangulate(space, |triangle| triangles.push(triangle)), "{} corners", points.len());
-    let whole = area(points, &(0..points.len()).collect::<Vec<_>>());
+    let total = area(points, &(0..points.len()).collect::<Vec<_>>());
     let areas: Vec<f64> = triangles.iter().map(|triangle| area(points, triangle)).collect();
-    assert!(areas.iter().all(|area| area * whole >= 0.0), "a triangle is turned around");
+    assert!(areas.iter().all(|area| area * total >= 0.0), "a triangle is flipped");
     let sum: f64 = areas.iter().sum();
-    assert!((sum - whole).abs() <= 1e-9 * whole.abs(), "{sum} of {whole}");
+    assert!((sum - total).abs() <= 1e-9 * total.abs(), "{sum} of {total}");
     triangles
 }
 
-/// Twice the signed area inside the outline over these corners (the shoelace formula).
+/// Twice the signed area enclosed by these corners (the shoelace formula).
 fn area(points: &[(f32, f32)], corners: &[usize]) -> f64 {
-    let at = |place: usize| {
-        let (x, y) = points[corners[place % corners.len()]];
+    let at = |index: usize| {
+        let (x, y) = points[corners[index % corners.len()]];
         DVec2::new(f64::from(x), f64::from(y))
     };
-    (0..corners.len()).map(|place| at(place).perp_dot(at(place + 1))).sum()
+    (0..corners.len()).map(|index| at(index).perp_dot(at(index + 1))).sum()
 }
 
-/// Number of triangles with a point in their interiors.
+/// Number of triangles that contain a point in their interior.
 fn layers(points: &[(f32, f32)], triangles: &[[usize; 3]], x: f64, y: f64) -> usize {
     let at = |corner: usize| DVec2::new(f64::from(points[corner].0), f64::from(points[corner].1));
     let holds = |triangle: &&[usize; 3]| {
@@ -48,10 +48,10 @@ fn reversed(points: &[(f32, f32)]) -> Points {
     points.iter().rev().copied().collect()
 }
 
-/// Numbers from 0 to 1 (a linear congruential generator).
-struct Random(u64);
+/// Uniform random numbers in [0, 1) (a linear congruential generator).
+struct Lcg(u64);
 
-impl Random {
+impl Lcg {
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
@@ -63,7 +63,7 @@ impl Random {
 }
 
 #[test]
-fn a_dart_is_cut_along_its_inner_diagonal() {
+fn darts_are_cut_along_the_inner_diagonal() {
     let dart = [(0.0, 0.0), (4.0, 0.0), (1.0, 1.0), (0.0, 4.0)];
     assert_eq!(cut(&dart), [[0, 1, 2], [0, 2, 3]]);
     let turned = [(4.0, 0.0), (1.0, 1.0), (0.0, 4.0), (0.0, 0.0)];
@@ -81,7 +81,7 @@ fn comb(teeth: usize) -> Points {
 }
 
 #[test]
-fn combs_of_any_size_are_covered_once() {
+fn combs_are_covered_exactly_once() {
     for teeth in [3, 300, 350, 10_000] {
         let points = comb(teeth);
         assert_eq!(cut(&points).len(), points.len() - 2);
@@ -93,11 +93,11 @@ fn combs_of_any_size_are_covered_once() {
 }
 
 #[test]
-fn work_per_corner_hardly_grows() {
-    // Gears, spirals and coasts: outlines whose corners block each other.
+fn work_per_corner_is_nearly_constant() {
+    // Gears, spirals, coastlines and combs: outlines whose corners block each other.
     let visits = |points: &[(f32, f32)]| {
         let plane: Vec<DVec2> = points.iter().map(|&(x, y)| DVec2::new(x.into(), y.into())).collect();
-        let (is_simple, visits) = ears::counted(&plane);
+        let (is_simple, visits) = ears::count_visits(&plane);
         assert!(is_simple, "{} corners", points.len());
         visits / points.len() as u64
     };
@@ -122,12 +122,12 @@ fn gear(teeth: usize) -> Points {
 }
 
 fn coast(corners: usize) -> Points {
-    let mut random = Random(5);
+    let mut random = Lcg(5);
     let radii: Vec<f64> = (0..corners).map(|_| 5.0 + random.next()).collect();
     around(corners, |index| radii[index])
 }
 
-/// A band that winds inwards twenty times.
+/// A band that spirals inwards with twenty turns.
 fn spiral(steps: usize) -> Points {
     let side = |offset: f64| {
         move |step: usize| {
@@ -141,35 +141,36 @@ fn spiral(steps: usize) -> Points {
 }
 
 #[test]
-fn smooth_outlines_do_not_become_fans() {
+fn smooth_outlines_are_not_cut_into_fans() {
     let triangles = cut(&coast(1000));
     let mut uses = vec![0; 1000];
     triangles.as_flattened().iter().for_each(|corner| uses[*corner] += 1);
     assert!(uses.iter().all(|uses| *uses < 100), "{uses:?}");
 }
 
-/// A square with square holes in rows and columns, each joined by an edge in both directions to the outline or to a hole before it.
+/// A square with a grid of square holes. Each hole is connected to the outline or a previous hole by an edge
+/// in both directions.
 fn sieve(side: usize) -> Points {
     let size = 3.0 * side as f32 + 1.0;
     let mut outline = vec![(0.0, 0.0), (size, 0.0), (size, size), (0.0, size)];
     for hole in 0..side * side {
         let (x, y) = (3.0 * (hole % side) as f32 + 1.0, 3.0 * (hole / side) as f32 + 1.0);
         let corners = [(x, y), (x, y + 2.0), (x + 2.0, y + 2.0), (x + 2.0, y)];
-        // The outline's corner, or one of the hole below or on the left.
+        // Start at the outline's corner, or at a corner of the hole below or to the left.
         let from = match (hole % side, hole / side) {
             (0, 0) => (0.0, 0.0),
             (0, _) => (x, y - 1.0),
             _ => (x - 1.0, y),
         };
-        let place = outline.iter().position(|corner| *corner == from).expect("visited before");
+        let index = outline.iter().position(|corner| *corner == from).expect("visited before");
         let bridge = corners.into_iter().chain([corners[0], from]);
-        outline.splice(place + 1..place + 1, bridge);
+        outline.splice(index + 1..index + 1, bridge);
     }
     outline
 }
 
 #[test]
-fn holes_joined_by_an_edge_in_both_directions_stay_open() {
+fn holes_connected_by_double_edges_stay_open() {
     let frame = [
         (0.0, 0.0),
         (3.0, 0.0),
@@ -204,7 +205,8 @@ fn holes_joined_by_an_edge_in_both_directions_stay_open() {
 
 #[test]
 fn outlines_may_touch_themselves() {
-    // Two squares at a corner, a corner on an edge from inside and from outside, a path there and back, and corners in a row.
+    // Two squares that share a corner, a corner on an edge from inside and from outside, an edge traversed
+    // back and forth, and collinear corners.
     let touching: [&[(f32, f32)]; 6] = [
         &[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0), (1.0, 1.0), (0.0, 1.0)],
         &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 4.0), (2.0, 0.0), (1.0, 4.0), (0.0, 4.0)],
@@ -246,7 +248,7 @@ fn outlines_may_touch_themselves() {
 }
 
 #[test]
-fn corners_in_a_row_stay_corners() {
+fn collinear_corners_stay_corners() {
     let row = |from: (f32, f32), to: (f32, f32)| {
         (0..20).map(move |step| {
             let t = step as f32 / 20.0;
@@ -261,31 +263,31 @@ fn corners_in_a_row_stay_corners() {
 }
 
 #[test]
-fn random_outlines_are_covered_once() {
-    let mut random = Random(3);
+fn random_outlines_are_covered_exactly_once() {
+    let mut random = Lcg(3);
     for case in 0..2000 {
-        // A polyomino's outline touches itself where two cells meet at a corner.
+        // The outline of a polyomino touches itself where two cells share only a corner.
         let points = if case % 2 == 0 { polyomino(&mut random, 4 + case % 40) } else { coast(5 + case % 60) };
         cut(&points);
     }
 }
 
-/// The outline of a simply connected polyomino, by its cells' boundary edges with the cells on their left.
-fn polyomino(random: &mut Random, size: usize) -> Points {
+/// The outline of a simply connected polyomino, with its cells on the left.
+fn polyomino(random: &mut Lcg, size: usize) -> Points {
     let mut cells = vec![(0_i32, 0_i32)];
     let has = |cells: &[(i32, i32)], x, y| cells.contains(&(x, y));
     while cells.len() < size {
         let (x, y) = cells[random.below(cells.len())];
         let (dx, dy) = [(1, 0), (-1, 0), (0, 1), (0, -1)][random.below(4)];
         let (x, y) = (x + dx, y + dy);
-        // A cell with one neighbor closes no hole by edges.
+        // A cell with only one neighbor does not close a hole.
         let neighbors =
             [(1, 0), (-1, 0), (0, 1), (0, -1)].iter().filter(|(dx, dy)| has(&cells, x + dx, y + dy));
         if !has(&cells, x, y) && neighbors.count() == 1 {
             cells.push((x, y));
         }
     }
-    // Walk along the boundary, turning left into the same cell wherever cells meet at a corner.
+    // Walk along the boundary, staying in the same cell where cells share only a corner.
     let start = *cells.iter().min().expect("a cell");
     let ((mut x, mut y), (mut dx, mut dy)) = (start, (1, 0));
     let mut outline = Vec::new();
@@ -306,7 +308,7 @@ fn polyomino(random: &mut Random, size: usize) -> Points {
 }
 
 #[test]
-fn a_polygon_that_crosses_itself_is_reported() {
+fn self_intersecting_polygons_are_reported() {
     let star: Vec<Vec3> = (0..7)
         .map(|i| std::f32::consts::TAU * 3.0 * i as f32 / 7.0)
         .map(|angle| Vec3::new(angle.cos(), 7.0, angle.sin()))

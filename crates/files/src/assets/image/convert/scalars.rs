@@ -1,32 +1,36 @@
-//! Numbers of pixels: a channel, alpha or the luminance.
+//! Scalar values of pixels: a channel, alpha or the luminance.
 
 use ::image::DynamicImage;
 
 use super::{Sample, alpha, channels, clean, is_everywhere, rgb, with_samples};
-use crate::assets::image::facts::Facts;
+use crate::assets::image::metadata::ImageMetadata;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::{Channel, PixelValue};
 use crate::math::Vec3;
 use crate::math::color::{luminance, srgb_to_linear};
 
-/// Samples of a pixel that make its number.
+/// Samples from which the scalar is computed.
 #[derive(Clone, Copy)]
-enum Samples {
-    /// One sample, which may be sRGB.
-    One(usize, bool),
-    /// Red, green and blue.
+enum ScalarSamples {
+    /// The sample at an index, and whether it is sRGB.
+    Sample(usize, bool),
+    /// Luminance of red, green and blue.
     Luminance,
-    /// None: the number is 1.
-    Nothing,
+    /// No sample: the scalar is 1.
+    One,
 }
 
-/// The samples that make a number.
-fn samples_of(image: &DynamicImage, (of, is_srgb): (PixelValue, bool), facts: &Facts) -> Samples {
+/// Selects the samples of a scalar.
+fn samples_of(
+    image: &DynamicImage,
+    (of, is_srgb): (PixelValue, bool),
+    metadata: &ImageMetadata,
+) -> ScalarSamples {
     let is_gray = channels(image) < 3;
-    let alpha = alpha(image, facts);
-    let of_color = |place: usize| Samples::One(if is_gray { 0 } else { place }, is_srgb);
-    let luminance = if is_gray { of_color(0) } else { Samples::Luminance };
-    let of_alpha = |alpha| Samples::One(alpha, false);
+    let alpha = alpha(image, metadata);
+    let of_color = |place: usize| ScalarSamples::Sample(if is_gray { 0 } else { place }, is_srgb);
+    let luminance = if is_gray { of_color(0) } else { ScalarSamples::Luminance };
+    let of_alpha = |alpha| ScalarSamples::Sample(alpha, false);
     match of {
         PixelValue::Luminance => luminance,
         PixelValue::Opacity => alpha.map_or(luminance, of_alpha),
@@ -38,11 +42,11 @@ fn samples_of(image: &DynamicImage, (of, is_srgb): (PixelValue, bool), facts: &F
         PixelValue::Channel(Channel::Red) => of_color(0),
         PixelValue::Channel(Channel::Green) => of_color(1),
         PixelValue::Channel(Channel::Blue) => of_color(2),
-        PixelValue::Channel(Channel::Alpha) => alpha.map_or(Samples::Nothing, of_alpha),
+        PixelValue::Channel(Channel::Alpha) => alpha.map_or(ScalarSamples::One, of_alpha),
     }
 }
 
-/// Whether the luminance of an opaque image is an opacity.
+/// Whether the luminance of an opaque image is used as its opacity.
 pub(super) fn is_gray_mask(image: &DynamicImage, of_any_color: bool) -> bool {
     of_any_color || has_gray_pixels(image)
 }
@@ -55,64 +59,66 @@ fn has_gray_pixels(image: &DynamicImage) -> bool {
     with_samples!(image, samples => all(samples, channels(image)))
 }
 
-/// One number of each pixel, in all channels of a texel.
-pub(super) fn texels(image: &DynamicImage, of: (PixelValue, bool), facts: &Facts) -> Texels {
+/// Converts an image to texels with the scalar in all channels.
+pub(super) fn texels(image: &DynamicImage, of: (PixelValue, bool), metadata: &ImageMetadata) -> Texels {
     let (width, height) = (image.width(), image.height());
-    let (channels, samples) = (channels(image), samples_of(image, of, facts));
+    let (channels, samples) = (channels(image), samples_of(image, of, metadata));
     let mut unusable = 0;
     let data = match (image, samples) {
-        (_, Samples::Nothing) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),
-        (DynamicImage::ImageLuma8(pixels), Samples::One(place, is_srgb)) => {
-            one(pixels, (channels, place), is_srgb)
+        (_, ScalarSamples::One) => TexelData::Linear8(vec![[u8::MAX; 3]; width as usize * height as usize]),
+        (DynamicImage::ImageLuma8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+            bytes(pixels, (channels, place), is_srgb)
         }
-        (DynamicImage::ImageLumaA8(pixels), Samples::One(place, is_srgb)) => {
-            one(pixels, (channels, place), is_srgb)
+        (DynamicImage::ImageLumaA8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+            bytes(pixels, (channels, place), is_srgb)
         }
-        (DynamicImage::ImageRgb8(pixels), Samples::One(place, is_srgb)) => {
-            one(pixels, (channels, place), is_srgb)
+        (DynamicImage::ImageRgb8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+            bytes(pixels, (channels, place), is_srgb)
         }
-        (DynamicImage::ImageRgba8(pixels), Samples::One(place, is_srgb)) => {
-            one(pixels, (channels, place), is_srgb)
+        (DynamicImage::ImageRgba8(pixels), ScalarSamples::Sample(place, is_srgb)) => {
+            bytes(pixels, (channels, place), is_srgb)
         }
         (image, samples) => {
             let is_srgb = of.1;
             with_samples!(image, pixels => {
                 unusable = unusable_pixels(pixels, channels, samples);
-                floating(pixels, channels, samples, is_srgb)
+                floats(pixels, channels, samples, is_srgb)
             })
         }
     };
     Texels { width, height, data, unusable }
 }
 
-/// Number of the pixels of which some sample that counts is not usable.
-fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: Samples) -> u64 {
-    let counted = match samples {
-        Samples::One(place, _) => place..place + 1,
-        Samples::Luminance => 0..3,
-        Samples::Nothing => 0..0,
+/// Number of pixels with an unusable sample among those that are read.
+fn unusable_pixels<T: Sample>(pixels: &[T], channels: usize, samples: ScalarSamples) -> u64 {
+    let used = match samples {
+        ScalarSamples::Sample(place, _) => place..place + 1,
+        ScalarSamples::Luminance => 0..3,
+        ScalarSamples::One => 0..0,
     };
     let is_broken =
-        |pixel: &&[T]| !pixel[counted.clone()].iter().all(|value| clean(value.unit()) == value.unit());
+        |pixel: &&[T]| !pixel[used.clone()].iter().all(|value| clean(value.unit()) == value.unit());
     pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
 
-/// Numbers that are bytes, by the number of samples of a pixel and the place of the one that counts.
-fn one(samples: &[u8], (channels, place): (usize, usize), is_srgb: bool) -> TexelData {
-    let texels = samples.chunks_exact(channels).map(|pixel| [pixel[place]; 3]).collect();
+/// Texels of 8-bit samples, given the samples per pixel and the index of the sample to use.
+fn bytes(samples: &[u8], (channels, index): (usize, usize), is_srgb: bool) -> TexelData {
+    let texels = samples.chunks_exact(channels).map(|pixel| [pixel[index]; 3]).collect();
     if is_srgb { TexelData::Srgb8(texels) } else { TexelData::Linear8(texels) }
 }
 
-/// Numbers in floats.
-fn floating<T: Sample>(all: &[T], channels: usize, samples: Samples, is_srgb: bool) -> TexelData {
+/// Texels of all other sample types.
+fn floats<T: Sample>(all: &[T], channels: usize, samples: ScalarSamples, is_srgb: bool) -> TexelData {
     let decoded = |sample: T, is_srgb: bool| {
         let value = clean(sample.unit());
         if is_srgb { srgb_to_linear(value) } else { value }
     };
     let number = |pixel: &[T]| match samples {
-        Samples::One(place, is_srgb) => decoded(pixel[place], is_srgb),
-        Samples::Luminance => luminance(Vec3::from_array(rgb(pixel).map(|sample| decoded(sample, is_srgb)))),
-        Samples::Nothing => 1.0,
+        ScalarSamples::Sample(place, is_srgb) => decoded(pixel[place], is_srgb),
+        ScalarSamples::Luminance => {
+            luminance(Vec3::from_array(rgb(pixel).map(|sample| decoded(sample, is_srgb))))
+        }
+        ScalarSamples::One => 1.0,
     };
     TexelData::Float(all.chunks_exact(channels).map(number).map(Vec3::splat).collect())
 }
@@ -125,14 +131,14 @@ mod tests {
     use ::image::ImageBuffer;
 
     fn number(image: DynamicImage, of: PixelValue, is_srgb: bool) -> f32 {
-        let texels = texels(image, ImageEncoding::Number { of, is_srgb }, &Facts::default());
+        let texels = texels(image, ImageEncoding::Number { of, is_srgb }, &ImageMetadata::default());
         let value = texels.get(0, 0);
         assert!(value.x == value.y && value.y == value.z, "{value}");
         value.x
     }
 
     #[test]
-    fn a_pixel_stands_for_a_number() {
+    fn pixel_values_are_scalars() {
         let color =
             || DynamicImage::ImageRgba8(ImageBuffer::from_pixel(1, 1, ::image::Rgba([51, 102, 204, 25])));
         let of = |channel| PixelValue::Channel(channel);
@@ -146,14 +152,14 @@ mod tests {
         ] {
             assert!((number(color(), which, false) - exact).abs() < 1e-4, "{which:?}");
         }
-        // Alpha has no encoding; the other channels are decoded.
+        // Alpha is linear; the other channels are decoded.
         assert!((number(color(), PixelValue::Opacity, true) - 25.0 / 255.0).abs() < 1e-6);
         assert!((number(color(), of(Channel::Blue), true) - srgb_to_linear(0.8)).abs() < 1e-6);
-        // An image without alpha is opaque, or its luminance counts.
-        let grey = || DynamicImage::ImageLuma8(ImageBuffer::from_pixel(1, 1, ::image::Luma([51])));
-        assert_eq!(number(grey(), of(Channel::Alpha), false), 1.0);
+        // An image without alpha has alpha 1; as an opacity, its luminance is used.
+        let gray = || DynamicImage::ImageLuma8(ImageBuffer::from_pixel(1, 1, ::image::Luma([51])));
+        assert_eq!(number(gray(), of(Channel::Alpha), false), 1.0);
         for which in [PixelValue::Opacity, PixelValue::Luminance, of(Channel::Green)] {
-            assert!((number(grey(), which, false) - 0.2).abs() < 1e-6, "{which:?}");
+            assert!((number(gray(), which, false) - 0.2).abs() < 1e-6, "{which:?}");
         }
         let deep =
             || DynamicImage::ImageLumaA16(ImageBuffer::from_pixel(1, 1, ::image::LumaA([13107, 52428])));
@@ -165,14 +171,14 @@ mod tests {
         let broken = texels(
             float(),
             ImageEncoding::Number { of: of(Channel::Green), is_srgb: false },
-            &Facts::default(),
+            &ImageMetadata::default(),
         );
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
-        // A pixel counts once, however many of its samples are broken.
+        // A pixel with several unusable samples counts once.
         let broken = texels(
             float(),
             ImageEncoding::Number { of: PixelValue::Luminance, is_srgb: false },
-            &Facts::default(),
+            &ImageMetadata::default(),
         );
         assert_eq!(broken.unusable, 1);
     }

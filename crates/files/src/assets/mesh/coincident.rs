@@ -1,22 +1,23 @@
-//! Vertices that share a place.
+//! Finds coincident vertices.
 
 use rayon::prelude::*;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Vertices of a bucket: buckets are sorted on all threads, with polls of the token between.
+/// Average number of vertices per bucket. Buckets are sorted in parallel, with a poll of the cancel token for
+/// each.
 const BUCKET: usize = 1 << 12;
 
-/// Vertices between two polls of the token.
+/// Vertices between two polls of the cancel token.
 const BATCH: usize = 1 << 16;
 
-/// A hash and its vertex.
-type Entry = (u32, u32);
+/// Hash and index of a vertex.
+type HashedVertex = (u32, u32);
 
-/// The places that several vertices share, each as its vertices in ascending order. The order of places is arbitrary,
-/// but always the same.
-pub(super) fn shared(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
+/// Finds sets of coincident vertices, each in ascending order. The order of the sets is arbitrary but
+/// deterministic.
+pub(super) fn find(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
     let bits = positions.len().div_ceil(BUCKET).next_power_of_two().ilog2();
     let mut hashes = vec![0; positions.len()];
     for (hashes, positions) in hashes.chunks_mut(BATCH).zip(positions.chunks(BATCH)) {
@@ -31,21 +32,26 @@ pub(super) fn shared(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<
     Ok(found?.into_iter().flatten().collect())
 }
 
-/// The bits of a place. Adding 0 turns −0 into 0.
+/// Bit pattern of a position. Adding 0 turns −0 into 0.
 fn place(position: Vec3) -> [u32; 3] {
     (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
-/// Hash by multiplication with odd constants (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4); the upper
-/// bits are the good ones.
+/// Multiplicative hash (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4). The upper bits are
+/// mixed best.
 fn hash_of(position: Vec3) -> u32 {
     let [x, y, z] = place(position).map(u64::from);
     let mixed = (x | y << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
 }
 
-/// Sorts vertices with their hashes into buckets by the upper bits; returns them with the end of each bucket.
-fn scatter(hashes: &[u32], bits: u32, token: &CancelToken) -> Result<(Vec<Entry>, Vec<usize>), Cancelled> {
+/// Distributes vertices over buckets by the upper bits of their hashes. Returns them with the end of each
+/// bucket.
+fn scatter(
+    hashes: &[u32],
+    bits: u32,
+    token: &CancelToken,
+) -> Result<(Vec<HashedVertex>, Vec<usize>), Cancelled> {
     let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
     for hashes in hashes.chunks(BATCH) {
@@ -68,8 +74,12 @@ fn scatter(hashes: &[u32], bits: u32, token: &CancelToken) -> Result<(Vec<Entry>
     Ok((entries, ends))
 }
 
-/// The shared places of one bucket: vertices are grouped by hash, then by place.
-fn in_bucket(bucket: &[Entry], positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
+/// Finds coincident vertices of one bucket by grouping first by hash, then by position.
+fn in_bucket(
+    bucket: &[HashedVertex],
+    positions: &[Vec3],
+    token: &CancelToken,
+) -> Result<Vec<Vec<u32>>, Cancelled> {
     token.check()?;
     let mut entries = bucket.to_vec();
     entries.sort_unstable();
@@ -89,20 +99,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_shared_place_is_found_with_all_its_vertices() {
-        // Places repeat after 5000 vertices; −0 equals 0.
+    fn coincident_vertices_are_found_completely() {
+        // Positions repeat after 5000 vertices; −0 equals 0.
         let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
         let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
-        let mut found = shared(&positions, &CancelToken::new()).expect("nobody cancels");
+        let mut found = find(&positions, &CancelToken::new()).expect("not cancelled");
         found.sort_unstable();
         let expected: Vec<Vec<u32>> =
             (0..5000).map(|i| (0..4).map(|turn| i + 5000 * turn).collect()).collect();
         assert_eq!(found, expected);
-        assert_eq!(shared(&[], &CancelToken::new()), Ok(Vec::new()));
+        assert_eq!(find(&[], &CancelToken::new()), Ok(Vec::new()));
     }
 
     #[test]
-    fn hashes_of_a_grid_spread_over_the_buckets() {
+    fn grid_positions_spread_over_all_buckets() {
         let mut counts = [0; 64];
         for i in 0..64_000_u32 {
             let position = Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32) * 0.5;

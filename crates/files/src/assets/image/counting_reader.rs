@@ -1,28 +1,29 @@
-//! A file that reports how far it was read, and can be stopped.
+//! A reader that reports its progress and can be stopped.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use super::apart::Reporter;
+use super::decode_thread::ProgressReporter;
 
-/// Most bytes read at once, so that a decoder which reads a whole image at once reports and stops as well.
+/// Maximum number of bytes per read, so that a decoder that reads the whole file at once still reports
+/// progress.
 const CHUNK: usize = 1 << 16;
 
-pub(super) struct Counting<R> {
+pub(super) struct CountingReader<R> {
     inner: R,
     at: u64,
-    /// Farthest byte read, as decoders may go back.
+    /// Farthest byte read, because decoders may seek backwards.
     reached: u64,
     length: u64,
-    report: Reporter,
+    report: ProgressReporter,
 }
 
-impl<R> Counting<R> {
-    pub(super) fn new(inner: R, length: u64, report: Reporter) -> Self {
+impl<R> CountingReader<R> {
+    pub(super) fn new(inner: R, length: u64, report: ProgressReporter) -> Self {
         Self { inner, at: 0, reached: 0, length, report }
     }
 }
 
-impl<R: Read> Read for Counting<R> {
+impl<R: Read> Read for CountingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let most = buffer.len().min(CHUNK);
         let got = self.inner.read(&mut buffer[..most])?;
@@ -33,7 +34,7 @@ impl<R: Read> Read for Counting<R> {
     }
 }
 
-impl<R: Seek> Seek for Counting<R> {
+impl<R: Seek> Seek for CountingReader<R> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.at = self.inner.seek(to)?;
         Ok(self.at)

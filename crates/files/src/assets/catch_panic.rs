@@ -1,0 +1,54 @@
+//! Turns panics of third-party decoders into errors.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Once;
+
+thread_local! {
+    static IS_CATCHING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs `work` and returns the message of a panic inside as an error, without printing it.
+///
+/// Installs a panic hook at the first call, which forwards all other panics to the previous hook. A front end
+/// that installs its own hook (to restore the terminal) must do so before it loads anything.
+///
+/// The panic's message.
+pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    silence_caught_panics();
+    let outer = IS_CATCHING.replace(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(work));
+    IS_CATCHING.set(outer);
+    result.map_err(|payload| message(payload.as_ref()))
+}
+
+fn silence_caught_panics() {
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let previous = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !IS_CATCHING.get() {
+                previous(info);
+            }
+        }));
+    });
+}
+
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_an_error_with_its_message() {
+        let number = 7;
+        assert_eq!(catch_panic(|| panic!("at {number}")), Err::<(), _>("at 7".to_owned()));
+        assert_eq!(catch_panic(|| 3), Ok(3));
+        assert!(!IS_CATCHING.get());
+    }
+}

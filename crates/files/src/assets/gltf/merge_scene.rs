@@ -1,0 +1,134 @@
+//! Merges the scene of a glTF file into one mesh, with materials as in mesh files.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+
+use super::description::{AffineMap, Alpha, ModelMaterial};
+use super::{Container, GltfError, ModelScene};
+use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
+use crate::control::{CancelToken, ignore_progress};
+use crate::geometry::mesh::TriangleMesh;
+use crate::math::Vec3;
+use crate::math::origin::origin_near;
+
+/// Maximum number of triangles, counting instances.
+const MAX_TRIANGLES: usize = 1 << 25;
+
+impl Container {
+    /// Merges the file's scene into one mesh.
+    ///
+    /// # Errors
+    /// Same as [`Container::scene`] and [`Container::part`], or the scene has no faces or too many.
+    pub fn merged_scene(&self, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
+        let scene = self.scene(token)?;
+        let Some([min, max]) = scene.bounds else {
+            return Err(self.wrong(GltfError::new("its scene shows no faces")));
+        };
+        let origin = origin_near((min + max) * 0.5, (max - min).max_element() * 0.5);
+        let (companions, pictures) = (self.companions.clone(), self.pictures());
+        let mut merged = LoadedMesh { hash: self.hash, companions, pictures, ..LoadedMesh::default() };
+        merged.mesh.origin = origin;
+        merged.material_warnings = self.material_warnings(&scene);
+        merged.warnings = scene.notes;
+        merged.materials = scene.materials.iter().map(file_material).collect();
+        // Add all instances. Each attribute is present for all vertices or none.
+        let mut parts: HashMap<usize, TriangleMesh> = HashMap::new();
+        for instance in &scene.instances {
+            let part = match parts.entry(instance.part) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => {
+                    let LoadedMesh { mesh, dropped, .. } =
+                        self.part(instance.part, &ignore_progress, token)?;
+                    merged.dropped.degenerate += dropped.degenerate;
+                    merged.dropped.non_finite += dropped.non_finite;
+                    new.insert(mesh)
+                }
+            };
+            if merged.mesh.triangles.len() + part.triangles.len() > MAX_TRIANGLES {
+                return Err(self.wrong(GltfError::new(format!(
+                    "more than {MAX_TRIANGLES} triangles including instances; use `glimt import` to keep the instances"
+                ))));
+            }
+            append(&mut merged.mesh, part, &instance.placed, instance.material as u32);
+            token.check()?;
+        }
+        Ok(merged)
+    }
+
+    fn material_warnings(&self, scene: &ModelScene) -> Vec<String> {
+        let has_texture =
+            |material: &ModelMaterial| material.color.texture.is_some() || material.normal.is_some();
+        let textured = scene.materials.iter().filter(|material| has_texture(material)).count();
+        let warning = format!(
+            "textures of {textured} materials are not shown in [[mesh]]; use `glimt import` to keep them"
+        );
+        if textured > 0 { vec![warning] } else { Vec::new() }
+    }
+}
+
+/// Appends a transformed part.
+fn append(merged: &mut TriangleMesh, part: &TriangleMesh, placed: &AffineMap, material: u32) {
+    let first = merged.positions.len() as u32;
+    let positions = part.positions.iter().map(|at| at.as_dvec3() + part.origin);
+    merged.positions.extend(positions.map(|at| (placed.point(at) - merged.origin).as_vec3()));
+    // Fill in attributes that only some parts have.
+    fill(&mut merged.normals, first, &part.normals, part.positions.len(), Vec3::ZERO, |normal| {
+        let transformed = placed.linear.inverse().transpose() * normal.as_dvec3();
+        transformed.normalize_or_zero().as_vec3()
+    });
+    fill(&mut merged.uvs, first, &part.uvs, part.positions.len(), crate::math::Vec2::ZERO, |uv| uv);
+    let second = &part.second_uvs;
+    fill(&mut merged.second_uvs, first, second, part.positions.len(), crate::math::Vec2::ZERO, |uv| uv);
+    fill(&mut merged.colors, first, &part.colors, part.positions.len(), [255; 3], |color| color);
+    // Swap two corners in mirrored parts to keep their orientation.
+    let is_mirrored = placed.linear.determinant() < 0.0;
+    let oriented = |[a, b, c]: [u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
+    merged
+        .triangles
+        .extend(part.triangles.iter().map(|corners| oriented(corners.map(|corner| first + corner))));
+    merged.materials.resize(merged.triangles.len(), material);
+}
+
+/// Appends vertex attributes to a list that is empty while no part has the attribute.
+fn fill<T: Copy>(all: &mut Vec<T>, first: u32, more: &[T], count: usize, missing: T, map: impl Fn(T) -> T) {
+    if all.is_empty() && more.is_empty() {
+        return;
+    }
+    all.resize(first as usize, missing);
+    all.extend(more.iter().map(|value| map(*value)));
+    all.resize(first as usize + count, missing);
+}
+
+/// Converts the properties that mesh file materials have.
+fn file_material(material: &ModelMaterial) -> FileMaterial {
+    let number = |slot: &super::TexturedValue| slot.factor.x as f32;
+    FileMaterial {
+        name: material.name.clone(),
+        diffuse: material.color.factor.as_vec3(),
+        specular: Vec3::ZERO,
+        shininess: 1.0,
+        emission: material.emission.factor.as_vec3(),
+        ior: material.ior as f32,
+        illumination_model: material.glass.map(|_| 7),
+        opacity: match &material.alpha {
+            Alpha::Opaque => 1.0,
+            Alpha::Blend(value) => number(value),
+            Alpha::Mask { value, cutoff } if value.factor.x < *cutoff => 0.0,
+            Alpha::Mask { .. } => 1.0,
+        },
+        opacity_texture: None,
+        diffuse_texture: None,
+        specular_texture: None,
+        emission_texture: None,
+        normal_texture: None,
+        normal_strength: 1.0,
+        physical: Some(PhysicalMaterial {
+            roughness: number(&material.roughness),
+            metallic: number(&material.metallic),
+            clearcoat: number(&material.clearcoat),
+            clearcoat_roughness: number(&material.clearcoat_roughness),
+            roughness_texture: None,
+            metallic_texture: None,
+        }),
+    }
+}

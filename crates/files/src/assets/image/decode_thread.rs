@@ -1,0 +1,148 @@
+//! Runs image decoders, which do not poll the cancel token, on a separate thread. A cancelled call abandons
+//! the thread.
+
+use std::io;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use crate::assets::read::Monitor;
+use crate::control::{CancelToken, Cancelled};
+
+/// Time between two polls of the cancel token.
+const POLL: Duration = Duration::from_millis(2);
+
+/// Maximum number of unread progress reports.
+const QUEUE_LENGTH: usize = 16;
+
+/// Abandoned threads that have not finished.
+static ABANDONED: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
+
+/// Reports the progress of a decoder.
+#[derive(Clone)]
+pub(super) struct ProgressReporter(Option<SyncSender<u64>>);
+
+impl ProgressReporter {
+    /// Reports that `done` bytes were read. Returns an error if the call was cancelled, so that the decoder
+    /// can stop early.
+    pub(super) fn reached(&self, done: u64) -> io::Result<()> {
+        match &self.0 {
+            Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Cancelled)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Runs `work` on another thread and forwards its progress reports, out of `total`. Returns `None` if the
+/// work panicked. If no thread can be started, runs the work here, without reports or cancellation.
+///
+/// Abandoned work still holds memory, so new work waits until all of it has finished.
+pub(super) fn run<T: Send + 'static>(
+    monitor: Monitor<'_>,
+    total: u64,
+    work: impl FnOnce(ProgressReporter) -> T + Send + 'static,
+) -> Result<Option<T>, Cancelled> {
+    wait_for_abandoned(monitor.token)?;
+    let (report, reports) = mpsc::sync_channel(QUEUE_LENGTH);
+    let (send, result) = mpsc::channel();
+    // Keep access to the work in case the thread does not start.
+    let work = Arc::new(Mutex::new(Some(work)));
+    let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let shared = Arc::clone(&work);
+    let run = move || {
+        if let Some(work) = take(&shared) {
+            let _ = send.send(work(ProgressReporter(Some(report))));
+        }
+    };
+    let Ok(thread) = thread::Builder::new().name("glimt-image".to_owned()).spawn(run) else {
+        return Ok(take(&work).map(|work| work(ProgressReporter(None))));
+    };
+    let waited = wait(&reports, &result, monitor, total);
+    if waited.is_err() {
+        abandoned().push(thread);
+    }
+    waited
+}
+
+fn wait<T>(
+    reports: &Receiver<u64>,
+    result: &Receiver<T>,
+    monitor: Monitor<'_>,
+    total: u64,
+) -> Result<Option<T>, Cancelled> {
+    loop {
+        match reports.recv_timeout(POLL) {
+            Ok(done) => monitor.tick(done as usize, total as usize)?,
+            Err(RecvTimeoutError::Timeout) => monitor.token.check()?,
+            // The decoder has dropped its reporter, so it has read everything.
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    loop {
+        match result.recv_timeout(POLL) {
+            Ok(value) => return Ok(Some(value)),
+            Err(RecvTimeoutError::Timeout) => monitor.token.check()?,
+            Err(RecvTimeoutError::Disconnected) => return Ok(None),
+        }
+    }
+}
+
+fn wait_for_abandoned(token: &CancelToken) -> Result<(), Cancelled> {
+    loop {
+        token.check()?;
+        let mut threads = abandoned();
+        threads.retain(|thread| !thread.is_finished());
+        if threads.is_empty() {
+            return Ok(());
+        }
+        drop(threads);
+        thread::sleep(POLL);
+    }
+}
+
+fn abandoned() -> std::sync::MutexGuard<'static, Vec<JoinHandle<()>>> {
+    ABANDONED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::ignore_progress;
+
+    #[test]
+    fn only_new_work_waits_for_cancelled_work() {
+        let token = CancelToken::new();
+        let (release, released) = mpsc::channel::<()>();
+        let (send, ended) = mpsc::channel();
+        let cancel = token.clone();
+        let stuck = move |report: ProgressReporter| {
+            cancel.cancel();
+            // The work is released only after the call has returned. Without that, the wait times out after
+            // 20 s.
+            let in_time = released.recv_timeout(Duration::from_secs(20)).is_ok();
+            let _ = send.send((in_time, report.reached(1).is_err()));
+        };
+        let monitor = Monitor { progress: &ignore_progress, token: &token };
+        assert_eq!(run(monitor, 1, stuck).err(), Some(Cancelled));
+        release.send(()).expect("the work continues");
+        let fresh = CancelToken::new();
+        let next = move |_| ended.try_recv();
+        let ended =
+            run(Monitor { progress: &ignore_progress, token: &fresh }, 1, next).expect("not cancelled");
+        assert_eq!(ended, Some(Ok((true, true))));
+    }
+
+    #[test]
+    fn reports_keep_order_and_panics_give_no_result() {
+        let token = CancelToken::new();
+        let seen = Mutex::new(Vec::new());
+        let note = |done, total| seen.lock().expect("no panic").push((done, total));
+        let monitor = Monitor { progress: &note, token: &token };
+        let work = |report: ProgressReporter| (1..=3).map(|i| report.reached(i).is_ok()).collect::<Vec<_>>();
+        assert_eq!(run(monitor, 3, work), Ok(Some(vec![true; 3])));
+        assert_eq!(*seen.lock().expect("no panic"), [(1, 3), (2, 3), (3, 3)]);
+        let panics = |_| crate::assets::catch_panic::catch_panic(|| panic!("broken"));
+        assert_eq!(run::<Result<(), String>>(monitor, 3, panics), Ok(Some(Err("broken".to_owned()))));
+    }
+}

@@ -1,0 +1,64 @@
+//! Metadata of an image that its decoder does not apply to the pixels.
+
+use super::icc;
+use super::space::ColorSpace;
+
+/// Meaning of the alpha sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum AlphaUsage {
+    /// Straight alpha: colors are not multiplied by it.
+    #[default]
+    Straight,
+    /// Premultiplied alpha: colors are multiplied by it.
+    Premultiplied,
+    /// Straight alpha, or unused if it is 0 everywhere.
+    UnusedIfZero,
+    /// Unused sample.
+    Unused,
+}
+
+/// A warning about an ignored part of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ImageWarning {
+    /// Line number, from 1, in files with lines.
+    pub(super) line: Option<usize>,
+    pub(super) words: String,
+}
+
+/// Metadata of an image.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ImageMetadata {
+    /// Color space.
+    pub(super) space: ColorSpace,
+    /// Meaning of the alpha sample.
+    pub(super) alpha: AlphaUsage,
+    /// Warnings about ignored parts of the file.
+    pub(super) warnings: Vec<ImageWarning>,
+}
+
+impl ImageMetadata {
+    /// Adds a warning.
+    pub(super) fn warn(&mut self, words: impl Into<String>) {
+        self.warnings.push(ImageWarning { line: None, words: words.into() });
+    }
+
+    /// Warns about an animation, of which only the first frame is used.
+    pub(super) fn warn_of_frames(&mut self, frames: u32) {
+        if frames > 1 {
+            self.warn(format!("it has {frames} frames; only the first is used"));
+        }
+    }
+
+    /// Applies an ICC profile. `None` is a profile that could not be decompressed.
+    pub(super) fn add_profile(&mut self, profile: Option<&[u8]>, is_gray: bool) {
+        match profile.map_or(Err(icc::MALFORMED.to_owned()), |profile| icc::space(profile, is_gray)) {
+            Ok(space) => self.space = space,
+            Err(reason) => self.warn(profile_ignored(&reason)),
+        }
+    }
+}
+
+/// Warning about an ICC profile.
+pub(super) fn profile_ignored(reason: &str) -> String {
+    format!("the color profile is ignored ({reason}); colors are read as sRGB")
+}
