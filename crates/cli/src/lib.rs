@@ -33,7 +33,6 @@ use clap::Parser;
 use self::args::{Args, Subcommand};
 use self::console::Console;
 pub use self::exit::Exit;
-pub use self::once::NO_IMAGE_WRITTEN;
 use crate::scene::nearest::nearest;
 use crate::scene::sanitize::visible;
 

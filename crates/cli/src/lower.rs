@@ -125,7 +125,7 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     }
 }
 
-/// Rejects a path that is already known, and adds it otherwise.
+/// Adds a path, or rejects it if it is already known.
 fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), String> {
     if !known.insert(path) {
         return Err(format!("-o {} is given twice", path.display()));

@@ -28,9 +28,6 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);
 
-/// Message after a signal if no image was written.
-pub const NO_IMAGE_WRITTEN: &str = "no image was written";
-
 /// Runs `--once`.
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
     // Lower the priority before starting threads, which inherit it.
@@ -118,7 +115,7 @@ fn outcome(is_whole: bool, written: &WrittenFiles) -> String {
         .as_ref()
         .map(|path| format!("progress saved in {}; use --resume to continue", path.display()));
     let words = match names.as_slice() {
-        [] => return kept.unwrap_or_else(|| NO_IMAGE_WRITTEN.to_owned()),
+        [] => return kept.unwrap_or_else(|| "no image was written".to_owned()),
         [_] if is_whole => return "the image was written".to_owned(),
         _ if is_whole => return "all images were written".to_owned(),
         [only] => format!("only {only} was written"),

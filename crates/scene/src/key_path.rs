@@ -28,7 +28,7 @@ pub fn split_key(text: &str) -> Option<(&str, &str)> {
     find_unquoted(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
 }
 
-/// Shortens a dotted key to `columns`. Drops leading tables first, and cuts the last part only if it is too long by itself.
+/// Shortens a dotted key to `columns`. Drops leading tables first, and cuts the last part only if it does not fit.
 pub fn shortened_key(key: &str, columns: usize) -> String {
     let key = visible(key);
     if key.width() <= columns {
