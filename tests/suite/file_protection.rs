@@ -82,7 +82,7 @@ fn bench_never_replaces_a_foreign_file() {
             _ => "a plot",
         };
         let expected = format!(
-            "error: cannot write {name}: the file of this name is not {what} that glimt wrote; \
+            "error: cannot write {name}: the existing file is not {what} that glimt wrote; \
              name another file with {option} FILE, or --force replaces it\n"
         );
         assert_eq!(stderr, expected);

@@ -20,7 +20,7 @@ use crate::choice::Choice;
 use crate::console::answer_columns;
 use crate::environment;
 use crate::film::Rect;
-use crate::output::{Format, MovingFormat};
+use crate::output::{AnimationFormat, Format};
 use crate::pipeline::settings::{Checkpoints, OutputLayer, Overrides, Resume, Side, UpAxis, View};
 use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
@@ -623,8 +623,8 @@ fn listed<C: Choice>(about: &str) -> String {
 /// Long help of `--output`, with the extensions of all formats that glimt writes.
 fn outputs_help() -> String {
     // Skip jpeg, the same format as jpg.
-    let still: Vec<_> = Format::endings().filter(|ending| *ending != "jpeg").collect();
-    let moving: Vec<_> = MovingFormat::endings().collect();
+    let still: Vec<_> = Format::extensions().filter(|ending| *ending != "jpeg").collect();
+    let moving: Vec<_> = AnimationFormat::extensions().collect();
     format!(
         "Output file; can be given several times\n\n\
          The extension chooses the format: {}; with --turntable also {}. The default is the scene's `output`, relative to \

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use crate::args::{Progress, RenderArgs};
+use crate::output::AnimationFormat;
 use crate::output::Format;
-use crate::output::MovingFormat;
 use crate::output::write::STDOUT;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::turntable;
@@ -106,8 +106,8 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     }
     let mut known = HashSet::new();
     for path in &args.outputs {
-        if MovingFormat::of(path).is_none() {
-            Format::of(path).map_err(|error| format!("{error}, or for a turntable .gif, .apng"))?;
+        if AnimationFormat::from_path(path).is_none() {
+            Format::from_path(path).map_err(|error| format!("{error}, or for a turntable .gif, .apng"))?;
         }
         turntable::check_name(path)?;
         check_once(path, &mut known)?;
@@ -137,13 +137,13 @@ fn check_once<'a>(path: &'a Path, known: &mut HashSet<&'a Path>) -> Result<(), S
 fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
     let mut known = HashSet::new();
     for path in outputs {
-        if MovingFormat::of(path).is_some() {
+        if AnimationFormat::from_path(path).is_some() {
             let name = path.display();
             return Err(format!(
                 "{name} is an animation, which needs --turntable N; use .png for a single image"
             ));
         }
-        Format::of(path).map_err(|error| error.to_string())?;
+        Format::from_path(path).map_err(|error| error.to_string())?;
         check_once(path, &mut known)?;
     }
     Ok(())

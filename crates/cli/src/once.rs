@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::lower::Order;
-use crate::output::MovingFormat;
+use crate::output::AnimationFormat;
 use crate::pipeline::protocol::{
     CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
 };
@@ -383,7 +383,7 @@ fn exit_of(failure: &Failure) -> Exit {
 /// Describes a written image: `wrote cornell.png (640×480, 64 samples, 1.93 s)`.
 fn wrote(path: &Path, report: &Report, turn: Option<Turn>) -> String {
     let image = &report.image;
-    if let Some(turn) = turn.filter(|_| MovingFormat::of(path).is_some()) {
+    if let Some(turn) = turn.filter(|_| AnimationFormat::from_path(path).is_some()) {
         return format!("wrote {} ({}×{}, {} frames)", path.display(), image.width, image.height, turn.of);
     }
     let samples = match (image.samples.min, image.samples.max) {

@@ -11,7 +11,7 @@ use super::stages::parse::Parsed;
 use super::watch::content::{Content, FileRead};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
-use crate::output::part::Trait;
+use crate::output::part::Dependency;
 use crate::scene::description::{CameraChange, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
@@ -28,19 +28,19 @@ pub(super) struct ImageDependencies<'a> {
 
 impl ImageDependencies<'_> {
     /// Returns the names and values.
-    pub(super) fn traits(&self) -> Vec<Trait> {
-        let mut traits = vec![Trait::setting("glimt", BUILD)];
+    pub(super) fn traits(&self) -> Vec<Dependency> {
+        let mut traits = vec![Dependency::setting("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
-        traits.extend(others.map(|file| Trait::file(&short(&file.path, scene_path), content(file))));
-        traits.push(Trait::everything(self.everything().to_string()));
+        traits.extend(others.map(|file| Dependency::file(&short(&file.path, scene_path), content(file))));
+        traits.push(Dependency::everything(self.everything().to_string()));
         traits
     }
 
-    fn add_settings(&self, traits: &mut Vec<Trait>) {
+    fn add_settings(&self, traits: &mut Vec<Dependency>) {
         let RenderSettings { render, dof, view, photons } = self.plan.settings.effective();
-        let mut add = |name: &str, value: String| traits.push(Trait::setting(name, value));
+        let mut add = |name: &str, value: String| traits.push(Dependency::setting(name, value));
         add("width", render.width.to_string());
         add("height", render.height.to_string());
         add("error", render.error.to_string());

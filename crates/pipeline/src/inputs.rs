@@ -9,7 +9,7 @@ use super::stages::meshes::Meshes;
 use super::stages::parse::Parsed;
 use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
-use crate::output::{FileIdentity, Likeness};
+use crate::output::{FileFingerprint, FileIdentity};
 use crate::scene::description::Camera;
 use crate::scene::{Loaded, is_model};
 
@@ -101,7 +101,7 @@ impl Inputs {
             if let Some(identity) = FileIdentity::of(&input.path) {
                 on_disk.by_identity.entry(identity).or_insert(input);
             }
-            on_disk.alike.extend(Likeness::of(&input.path).map(|likeness| (likeness, input)));
+            on_disk.alike.extend(FileFingerprint::of(&input.path).map(|likeness| (likeness, input)));
         }
         on_disk
     }
@@ -115,7 +115,7 @@ impl Inputs {
 /// Inputs indexed by file identity and by similarity.
 pub(super) struct OnDisk<'a> {
     by_identity: HashMap<FileIdentity, &'a Input>,
-    alike: Vec<(Likeness, &'a Input)>,
+    alike: Vec<(FileFingerprint, &'a Input)>,
 }
 
 impl<'a> OnDisk<'a> {
@@ -124,8 +124,8 @@ impl<'a> OnDisk<'a> {
         if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
             return Some(input);
         }
-        let own = Likeness::of(path)?;
-        self.alike.iter().find(|(likeness, _)| own.is_like(likeness)).map(|(_, input)| *input)
+        let own = FileFingerprint::of(path)?;
+        self.alike.iter().find(|(likeness, _)| own.may_equal(likeness)).map(|(_, input)| *input)
     }
 }
 

@@ -12,7 +12,7 @@ use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
 use crate::integrators::{AovSource, FirstHit, LightAov, PhotonSettings, RenderSettings};
 use crate::math::Vec3;
-use crate::output::MovingFormat;
+use crate::output::AnimationFormat;
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -203,7 +203,7 @@ impl OutputFiles {
         let Some(turn) = turn else { return Self { outputs: paths, moving, later_outputs } };
         let mut outputs = Vec::new();
         for path in paths {
-            if MovingFormat::of(&path).is_some() {
+            if AnimationFormat::from_path(&path).is_some() {
                 moving.push(path);
                 continue;
             }
@@ -231,7 +231,7 @@ fn check_layers(
         let (severity, path, help) = (Severity::Error, PathBuf::new(), Some(help.to_owned()));
         Err(Box::new(Diagnostic { severity, message, path, place: None, help }))
     };
-    let is_exr = |path: &&PathBuf| Format::of(path).is_ok_and(|format| format == Format::Exr);
+    let is_exr = |path: &&PathBuf| Format::from_path(path).is_ok_and(|format| format == Format::Exr);
     if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
         let message = format!("`--layers` needs EXR output; {} is not an EXR file", other.display());
         return refused(message, "write an EXR file, for example -o layers.exr");
@@ -245,7 +245,7 @@ fn check_layers(
 
 /// Checks that an animation can hold such images.
 fn check_moving(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
-    let Some(format) = MovingFormat::of(path) else { return Ok(()) };
+    let Some(format) = AnimationFormat::from_path(path) else { return Ok(()) };
     let message = match format.check_size(size.0, size.1) {
         Err(error) => error.to_string(),
         Ok(()) if bit_depth != 8 => format!("animated {format} files have 8 bits per channel"),
@@ -313,7 +313,7 @@ fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), B
 
 /// Checks that the file's format can hold such an image.
 fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
-    let check = || Format::of(path)?.check_picture(size.0, size.1, BitDepth::try_from(bit_depth)?);
+    let check = || Format::from_path(path)?.check_image(size.0, size.1, BitDepth::try_from(bit_depth)?);
     check().map_err(|error: OutputError| {
         let (severity, message) = (Severity::Error, error.to_string());
         Box::new(Diagnostic { severity, message, path: path.to_owned(), place: None, help: None })
@@ -434,7 +434,7 @@ mod tests {
             std::fs::write(&path, format!("[render]\noutput = \"a.{ending}\"\n{camera}")).expect("written");
             crate::scene::load(&path, &[])
         };
-        for ending in Format::endings() {
+        for ending in Format::extensions() {
             assert!(load(ending).is_ok(), "{ending}");
         }
         let wrong = format!("{:?}", load("xyz").expect_err("no format"));
@@ -442,7 +442,7 @@ mod tests {
         for ending in ["png", "exr", "hdr", "jpg", "jpeg", "ppm", "webp", "tga", "bmp"] {
             assert_eq!(
                 offered.contains(ending),
-                Format::endings().any(|known| known == ending),
+                Format::extensions().any(|known| known == ending),
                 "{ending}: {wrong}"
             );
         }

@@ -189,9 +189,9 @@ fn replace(
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep: None,
-        losses: Losses::Refused,
+        losses: Losses::Refuse,
     };
-    write::atomic_in_place_of(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
+    write::atomic_replace(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
         .map_err(|error| error.to_string())
 }
 

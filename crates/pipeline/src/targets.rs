@@ -12,8 +12,7 @@ use super::sink::Sink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::{FolderSweep, Guard};
 use crate::output::{
-    FileIdentity, Losses, OutputError, Replaced, replaced_json, replaced_picture, scene_of_picture,
-    scene_path,
+    FileIdentity, Losses, OutputError, Replaced, replaced_image, replaced_json, scene_of_image, scene_path,
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::is_mesh;
@@ -108,7 +107,7 @@ pub(super) fn guarded<'a, T>(
         is_kept: &|path| inputs.contain(path),
         may_replace: &may_replace,
         sweep,
-        losses: Losses::Told(&|what| sink.not_kept(what)),
+        losses: Losses::Report(&|what| sink.not_kept(what)),
     })
 }
 
@@ -191,7 +190,7 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
                 None => name.to_string(),
             };
             let help = format!("{remedy}; -o {own} or --force replaces it");
-            let replaced = replaced_picture(at);
+            let replaced = replaced_image(at);
             if let (Replaced::Own, Some(other)) = (&replaced, other_scene(plan, at)) {
                 let message = format!("cannot write {name}: it is the image of another scene, {other}");
                 return Some(call_error(message, Some(help)));
@@ -206,12 +205,12 @@ fn foreign_file_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Optio
             return other_part_error(plan, target, at);
         }
     };
-    Some(call_error(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))
+    Some(call_error(format!("cannot write {name}: {}", replaced.reason_to_keep()?), Some(help)))
 }
 
 /// Returns the scene of an image that glimt wrote, unless it is this scene.
 fn other_scene(plan: &Plan, at: &Path) -> Option<String> {
-    scene_of_picture(at).filter(|named| !scene_path::is_same(named, &plan.path, at))
+    scene_of_image(at).filter(|named| !scene_path::is_same(named, &plan.path, at))
 }
 
 /// Returns an error if the file is a checkpoint or another part of the same render, which may contain hours of work.
@@ -222,11 +221,11 @@ fn other_part_error(plan: &Plan, target: OutputTarget<'_>, at: &Path) -> Option<
     }
     let head = PartFile::head(at).ok();
     let what = match head.as_ref().map(|head| (head.kind, head.share.index, head.share.count)) {
-        Some((part::Kind::Part, index, count)) => match plan.shard {
+        Some((part::PartKind::Part, index, count)) => match plan.shard {
             Some((own, of)) if of != count || own == index => return None,
             Some(_) | None => format!("part {index}/{count} of a render"),
         },
-        Some((part::Kind::Checkpoint, ..)) => "a checkpoint".to_owned(),
+        Some((part::PartKind::Checkpoint, ..)) => "a checkpoint".to_owned(),
         None => "a part or a checkpoint of another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());

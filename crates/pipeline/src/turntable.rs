@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::math::DVec3;
 use crate::math::transform::sin_cos_degrees;
-use crate::output::MovingFormat;
+use crate::output::AnimationFormat;
 use crate::scene::description::Pose;
 
 /// Maximum number of frames.
@@ -58,7 +58,7 @@ impl Turn {
 /// # Errors
 /// A message with a suggestion.
 pub fn check_name(path: &Path) -> Result<(), String> {
-    if MovingFormat::of(path).is_some() || split_placeholder(path).is_some() {
+    if AnimationFormat::from_path(path).is_some() || split_placeholder(path).is_some() {
         return Ok(());
     }
     let name = path.display();

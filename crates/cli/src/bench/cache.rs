@@ -126,9 +126,13 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &CachedReferences) -> Resu
     bytes.extend(seal.as_bytes());
     let may_replace =
         |real: &Path| if is_replaceable(real) { Ok(()) } else { Err(refused(&path, "a reference")) };
-    let guard =
-        Guard { is_kept: &|_| false, may_replace: &may_replace, sweep: None, losses: Losses::Told(&|_| ()) };
-    write::atomic_until(&path, &bytes, &guard, &CancelToken::new())
+    let guard = Guard {
+        is_kept: &|_| false,
+        may_replace: &may_replace,
+        sweep: None,
+        losses: Losses::Report(&|_| ()),
+    };
+    write::atomic_guarded(&path, &bytes, &guard, &CancelToken::new())
 }
 
 /// Whether a file is missing, empty, or a possibly damaged reference.

@@ -141,7 +141,7 @@ fn report_unfinished(
             if progress.is_text() {
                 console.diagnostics(diagnostics);
             } else {
-                let messages: Vec<_> = diagnostics.iter().map(in_a_line).collect();
+                let messages: Vec<_> = diagnostics.iter().map(to_line).collect();
                 progress.failed("scene", &messages.join("; "));
             }
             Exit::WRONG
@@ -158,7 +158,7 @@ fn report_unfinished(
     }
 }
 
-fn in_a_line(diagnostic: &Diagnostic) -> String {
+fn to_line(diagnostic: &Diagnostic) -> String {
     format!("{}: {}", diagnostic.path.display(), diagnostic.message)
 }
 

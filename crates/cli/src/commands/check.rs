@@ -8,7 +8,7 @@ use crate::commands::info::instead_of_scene;
 use crate::console::Console;
 use crate::diagnostic_json::diagnostic;
 use crate::exit::Exit;
-use crate::output::json::in_a_line;
+use crate::output::json::to_line;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
 use crate::scene::report::Locator;
@@ -45,7 +45,7 @@ fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic(one, &mut places)).collect();
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
-    match in_a_line(&report) {
+    match to_line(&report) {
         Ok(line) => console.text(&format!("{line}\n")),
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }

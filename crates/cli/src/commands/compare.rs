@@ -16,7 +16,7 @@ use crate::exit::Exit;
 use crate::film::RadianceImage;
 use crate::output::part::is_part;
 use crate::output::write::{self, Guard};
-use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_one_file};
+use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_same_file};
 use crate::system::threads::start_failure;
 use crate::tui::wrapped;
 
@@ -87,7 +87,8 @@ struct ErrorImage<'a> {
 impl<'a> ErrorImage<'a> {
     /// Reports errors that can be detected before measuring.
     fn check(path: &'a Path, args: &CompareArgs, console: &Console) -> Result<Self, Exit> {
-        let format = Format::of(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
+        let format =
+            Format::from_path(path).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
         check_not_input(path, path, args).map_err(|error| console.fail(Exit::WRONG, &error.to_string()))?;
         output::check_target(path).map_err(|error| console.fail(Exit::FAILED, &error.to_string()))?;
         Ok(Self { path, format })
@@ -125,9 +126,9 @@ impl<'a> ErrorImage<'a> {
         let may_replace = |real: &Path| check_not_input(self.path, real, args);
         let is_kept = |path: &Path| check_not_input(path, path, args).is_err();
         let lost = RefCell::new(None);
-        let losses = Losses::Told(&|what| drop(lost.replace(Some(what))));
+        let losses = Losses::Report(&|what| drop(lost.replace(Some(what))));
         let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
-        write::atomic_until(self.path, &bytes, &guard, &token)?;
+        write::atomic_guarded(self.path, &bytes, &guard, &token)?;
         Ok(lost.into_inner())
     }
 }
@@ -141,7 +142,7 @@ fn check_not_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), O
         );
         return Err(OutputError::Refused { reason });
     }
-    match [&args.a, &args.b].into_iter().find(|input| is_one_file(real, input)) {
+    match [&args.a, &args.b].into_iter().find(|input| is_same_file(real, input)) {
         Some(input) => {
             let other = if path == input { String::new() } else { format!("{}, ", input.display()) };
             let name = path.display();
@@ -206,7 +207,7 @@ impl<'a> Summary<'a> {
 
 /// Prints the JSON object. Values that are not finite become null.
 fn say_json(summary: &Summary<'_>, console: &Console) {
-    match output::json::in_a_line(summary) {
+    match output::json::to_line(summary) {
         Ok(text) => console.answer(&text),
         Err(error) => console.say(&format!("error: {error}")),
     }

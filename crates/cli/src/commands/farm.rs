@@ -13,7 +13,7 @@ use crate::pipeline::protocol::Failure;
 use crate::system::text::is_plain;
 
 pub(crate) fn run(args: &FarmArgs, console: &Console) -> Exit {
-    if let Err(error) = Format::of(&args.output) {
+    if let Err(error) = Format::from_path(&args.output) {
         return console.fail(Exit::WRONG, &error.to_string());
     }
     let paths = [args.scene.to_str(), args.output.to_str()];

@@ -8,36 +8,36 @@ use crate::args::InfoArgs;
 use crate::console::Console;
 use crate::exit::Exit;
 use crate::output::json::file;
-use crate::output::settings::{Made, MadeError, made};
+use crate::output::settings::{ImageInfo, ImageInfoError, read_info};
 use crate::pipeline::protocol::Failure;
 use crate::progress::{failed, json_line};
 use crate::scene::other_content;
 use crate::scene::sanitize::visible;
 
 pub(crate) fn run(args: &InfoArgs, console: &Console) -> Exit {
-    let made = match describe(&args.image) {
-        Ok(made) => made,
+    let info = match describe(&args.image) {
+        Ok(info) => info,
         Err(error) => return console.fail(Exit::WRONG, &error.to_string()),
     };
     if args.json {
-        match file(&as_json(&args.image, &made)) {
+        match file(&as_json(&args.image, &info)) {
             Ok(text) => console.text(&text),
             Err(error) => return console.fail(Exit::FAILED, &error.to_string()),
         }
     } else {
-        console.text(&as_text(&args.image, &made));
+        console.text(&as_text(&args.image, &info));
     }
-    if made.is_own() { Exit::DONE } else { Exit::FAILED }
+    if info.is_own() { Exit::DONE } else { Exit::FAILED }
 }
 
 /// Describes how a file was made. For an image in a format without settings, only the format is known.
 ///
 /// # Errors
-/// Those of [`made`].
-fn describe(path: &Path) -> Result<Made, MadeError> {
-    made(path).or_else(|error| match (&error, other_content(path)) {
-        (MadeError::NoPicture { .. }, Some((format, _))) => {
-            Ok(Made { format: format.to_owned(), ..Made::default() })
+/// Those of [`read_info`].
+fn describe(path: &Path) -> Result<ImageInfo, ImageInfoError> {
+    read_info(path).or_else(|error| match (&error, other_content(path)) {
+        (ImageInfoError::NotAnImage { .. }, Some((format, _))) => {
+            Ok(ImageInfo { format: format.to_owned(), ..ImageInfo::default() })
         }
         _ => Err(error),
     })
@@ -47,31 +47,31 @@ fn describe(path: &Path) -> Result<Made, MadeError> {
 /// `None` for other files.
 pub(crate) fn instead_of_scene(path: &Path, is_json: bool, console: &Console) -> Option<Exit> {
     let (_, problem) = other_content(path)?;
-    let made = describe(path);
+    let info = describe(path);
     if is_json {
         let mut value = failed(&Failure::Scene(vec![*problem]));
-        value["image"] = made.map_or(Value::Null, |made| as_json(path, &made));
+        value["image"] = info.map_or(Value::Null, |info| as_json(path, &info));
         json_line(&value);
     } else {
         console.diagnostics(&[*problem]);
-        console.say_lines(&made.map_or_else(|error| format!("{error}\n"), |made| as_text(path, &made)));
+        console.say_lines(&info.map_or_else(|error| format!("{error}\n"), |info| as_text(path, &info)));
     }
     Some(Exit::WRONG)
 }
 
-fn as_json(path: &Path, made: &Made) -> Value {
+fn as_json(path: &Path, info: &ImageInfo) -> Value {
     let settings: Map<String, Value> =
-        made.settings.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect();
+        info.settings.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str()))).collect();
     json!({
         "path": path.to_string_lossy(),
-        "format": made.format,
-        "width": made.size.map(|(width, _)| width),
-        "height": made.size.map(|(_, height)| height),
-        "frames": made.frames,
-        "program": made.program,
-        "is_by_glimt": made.is_own(),
+        "format": info.format,
+        "width": info.size.map(|(width, _)| width),
+        "height": info.size.map(|(_, height)| height),
+        "frames": info.frames,
+        "program": info.program,
+        "is_by_glimt": info.is_own(),
         "settings": settings,
-        "channels": made.channels,
+        "channels": info.channels,
     })
 }
 
@@ -79,15 +79,15 @@ fn as_json(path: &Path, made: &Made) -> Value {
 const MAX_NAME_COLUMNS: usize = 40;
 
 /// A line about the file, followed by one for each setting.
-fn as_text(path: &Path, made: &Made) -> String {
+fn as_text(path: &Path, info: &ImageInfo) -> String {
     let name = path.to_string_lossy();
-    let size = made.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
-    let frames = made.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
-    let mut text = format!("{}: {}{size}{frames}\n", visible(&name), made.format);
-    let program = made.program.as_deref().unwrap_or("unknown (not stored in the file)");
+    let size = info.size.map_or(String::new(), |(width, height)| format!(", {width}×{height}"));
+    let frames = info.frames.map_or(String::new(), |frames| format!(", {frames} frames"));
+    let mut text = format!("{}: {}{size}{frames}\n", visible(&name), info.format);
+    let program = info.program.as_deref().unwrap_or("unknown (not stored in the file)");
     let mut lines = vec![("program", program)];
-    lines.extend(made.settings.iter().map(|(name, value)| (name.as_str(), value.as_str())));
-    let channels = made.channels.join(" ");
+    lines.extend(info.settings.iter().map(|(name, value)| (name.as_str(), value.as_str())));
+    let channels = info.channels.join(" ");
     if !channels.is_empty() {
         lines.push(("channels", &channels));
     }
@@ -107,8 +107,9 @@ mod tests {
     fn very_long_names_are_shown() {
         for length in [39, 41, 65_535, 65_536, 200_000] {
             let name = "n".repeat(length);
-            let made = Made { settings: vec![(name.clone(), "value".to_owned())], ..Made::default() };
-            let text = as_text(Path::new("a.png"), &made);
+            let info =
+                ImageInfo { settings: vec![(name.clone(), "value".to_owned())], ..ImageInfo::default() };
+            let text = as_text(Path::new("a.png"), &info);
             assert!(text.contains(&format!("{name}  value\n")) || length < 40, "{length}");
             assert!(text.contains("value"), "{length}");
         }

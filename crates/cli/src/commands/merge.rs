@@ -16,8 +16,8 @@ use crate::film::Film;
 use crate::film::tone::develop;
 use crate::merge_block::Block;
 use crate::output::part::{self, Merged, PartError, PartFile};
-use crate::output::write::{Guard, atomic_until};
-use crate::output::{self, Finish, Format, Losses, OutputError, is_one_file, scene_path};
+use crate::output::write::{Guard, atomic_guarded};
+use crate::output::{self, DevelopSettings, Format, Losses, OutputError, is_same_file, scene_path};
 use crate::progress::{json_line, style};
 use crate::scene::sanitize::{shortened, visible};
 use crate::signals;
@@ -83,11 +83,12 @@ impl Merge<'_> {
             let message = format!("cannot write {name}: it is a part; put the output before the parts");
             return Err(self.console.fail(Exit::WRONG, &message));
         }
-        if self.args.parts.iter().any(|part| is_one_file(part, out)) {
+        if self.args.parts.iter().any(|part| is_same_file(part, out)) {
             let message = format!("{name} is given both as the output and as a part");
             return Err(self.console.fail(Exit::WRONG, &message));
         }
-        let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
+        let format =
+            Format::from_path(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
         output::check_target(out).map_err(|error| self.console.fail(Exit::FAILED, &error.to_string()))?;
         Ok(format)
     }
@@ -102,8 +103,8 @@ impl Merge<'_> {
 
     /// An error message if the parts were rendered from the file at `path`.
     fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
-        let by_content = || part::input_in_place_of(parts, path).map(|name| (name, "it"));
-        let by_name = || part::input_of_that_name(parts, path).map(|name| (name, "a file of this name"));
+        let by_content = || part::input_with_content(parts, path).map(|name| (name, "it"));
+        let by_name = || part::input_with_name(parts, path).map(|name| (name, "a file of this name"));
         let (name, what) = by_content().or_else(by_name)?;
         let out = self.args.out.display();
         Some(format!(
@@ -284,7 +285,7 @@ impl Merge<'_> {
     fn write(
         &self,
         format: Format,
-        mut finish: Finish,
+        mut finish: DevelopSettings,
         merged: &Merged,
         parts: &[PartFile],
     ) -> Result<(), Exit> {
@@ -292,18 +293,22 @@ impl Merge<'_> {
         name_scene(&mut finish, parts, out);
         let film = &merged.film;
         let may_replace = |real: &Path| {
-            let is_given = self.args.parts.iter().any(|part| is_one_file(part, real));
+            let is_given = self.args.parts.iter().any(|part| is_same_file(part, real));
             let is_part = is_given || part::is_part(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
             let why = why.or_else(|| self.refused_input(parts, real));
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
-        let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_one_file(part, path));
+        let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_same_file(part, path));
         let tell = |what: String| self.console.say(&format!("warning: {what}"));
-        let guard =
-            Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses: Losses::Told(&tell) };
+        let guard = Guard {
+            is_kept: &is_kept,
+            may_replace: &may_replace,
+            sweep: None,
+            losses: Losses::Report(&tell),
+        };
         let bytes = self.pool.install(|| finish.encode(film, (&finish.image(film), &[]), format, token));
-        let written = bytes.and_then(|bytes| atomic_until(out, &bytes, &guard, token));
+        let written = bytes.and_then(|bytes| atomic_guarded(out, &bytes, &guard, token));
         written.map_err(|error| match error {
             OutputError::Cancelled(_) => Exit::FAILED,
             other => self.console.fail(Exit::FAILED, &other.to_string()),
@@ -325,7 +330,7 @@ impl Merge<'_> {
 
 /// Records the scene's path relative to the output, as a single render does. Tries its path relative to each part, then a file next to the
 /// output.
-fn name_scene(finish: &mut Finish, parts: &[PartFile], out: &Path) {
+fn name_scene(finish: &mut DevelopSettings, parts: &[PartFile], out: &Path) {
     let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
     let named = parts.iter().filter(|part| !part.head.scene.is_empty());
     let named = named.map(|part| part.path.with_file_name(&part.head.scene));

@@ -53,7 +53,7 @@ pub(crate) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
         }
         Err(source) => {
             // Prefer a more specific error about the folder.
-            let of_place = output::check_place(file).err();
+            let of_place = output::check_path(file).err();
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.fail(Exit::FAILED, &error.to_string())
         }
@@ -110,7 +110,7 @@ fn quoted(file: &Path) -> Option<String> {
 
 /// Whether a file has the extension of an image.
 fn is_image(file: &Path) -> bool {
-    Format::of(file).is_ok()
+    Format::from_path(file).is_ok()
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 
 use super::Reporter;
 use crate::diagnostic_json::diagnostic;
-use crate::output::json::in_a_line;
+use crate::output::json::to_line;
 use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::Locator;
@@ -55,9 +55,9 @@ pub(crate) fn line(value: &Value) {
 fn with_event_first(value: &Value) -> serde_json::Result<String> {
     let mut rest = value.clone();
     let Some(event) = rest.as_object_mut().and_then(|keys| keys.remove("event")) else {
-        return in_a_line(value);
+        return to_line(value);
     };
-    let (first, rest) = (in_a_line(&json!({ "event": event }))?, in_a_line(&rest)?);
+    let (first, rest) = (to_line(&json!({ "event": event }))?, to_line(&rest)?);
     let comma = if rest == "{}" { "" } else { "," };
     Ok(format!("{}{comma}{}", &first[..first.len() - 1], &rest[1..]))
 }

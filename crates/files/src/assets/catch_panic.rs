@@ -14,6 +14,8 @@ thread_local! {
 /// Installs a panic hook at the first call, which forwards all other panics to the previous hook. A front end
 /// that installs its own hook (to restore the terminal) must do so before it loads anything.
 ///
+/// # Errors
+///
 /// The panic's message.
 pub fn catch_panic<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     silence_caught_panics();

@@ -1,21 +1,21 @@
-//! Bias: whether a picture is brighter than its reference by more than their noise.
+//! Bias: whether an image is brighter than its reference by more than the noise of both.
 
 use super::Errors;
 
-/// Excess brightness of a picture, relative to the reference's mean luminance.
+/// Excess brightness of an image, relative to the reference's mean luminance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bias {
     /// mean (a − b) / mean b. `None` if the reference is black.
     pub value: Option<f64>,
-    /// Standard error of the bias by the noise of both. `None` if one of the two is not known.
+    /// Standard error of the bias due to the noise of both images. `None` if either is unknown.
     pub standard_error: Option<f64>,
-    /// Bias divided by its standard error. `None` without noise.
+    /// Bias divided by its standard error. `None` if that is unknown or zero.
     pub z: Option<f64>,
 }
 
 impl Bias {
-    /// The bias, with the standard errors of both mean luminances if they are known. The noise of one picture must not depend on
-    /// that of the other.
+    /// Computes the bias. `standard_errors` are those of both mean luminances, if known; the noise of the two
+    /// images must be independent.
     pub fn new(errors: &Errors, standard_errors: [Option<f64>; 2]) -> Self {
         let [a, b] = errors.luminances;
         let error = match standard_errors {
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_difference_over_the_reference_and_over_the_noise_of_both() {
+    fn bias_is_relative_to_reference_and_noise() {
         let bias = Bias::new(&errors(3.0, 2.0), [Some(0.3), Some(0.4)]);
         let near = |value: Option<f64>, expected: f64| (value.expect("known") - expected).abs() < 1e-6;
         assert!(near(bias.value, 0.5) && near(bias.standard_error, 0.5) && near(bias.z, 1.0), "{bias:?}");
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_known_is_not_told() {
+    fn unknown_values_are_none() {
         let bias = Bias::new(&errors(3.0, 2.0), [Some(0.3), None]);
         assert_eq!((bias.standard_error, bias.z, bias.value.is_some()), (None, None, true));
         assert_eq!(Bias::new(&errors(3.0, 3.0), [Some(0.0); 2]).z, None, "no noise and no difference");

@@ -1,12 +1,12 @@
-//! Colours for errors: black, purple, red, orange, pale yellow, in equal steps of lightness.
+//! Color map for errors: black, purple, red, orange, pale yellow, with uniform lightness steps.
 
 use std::f64::consts::TAU;
 
 use crate::math::Vec3;
 
-/// Linear Rec. 709 colour of a value in [0, 1]. CIE lightness is proportional to the value; the hue of Oklab
-/// (B. Ottosson, 2020) makes half a turn, and chroma is largest in the middle.
-pub(super) fn color(value: f64) -> Vec3 {
+/// Linear Rec. 709 color of a value in [0, 1]. CIE lightness is proportional to the value; the Oklab hue (B.
+/// Ottosson, 2020) makes half a turn, and chroma peaks in the middle.
+pub(super) fn error_color(value: f64) -> Vec3 {
     const LIGHTEST: f64 = 95.0;
     const CHROMA: f64 = 0.19;
     const PALEST: f64 = 0.07;
@@ -14,17 +14,17 @@ pub(super) fn color(value: f64) -> Vec3 {
     let turn = 0.79 + 0.5 * value;
     let chroma = CHROMA * 4.0 * value * (1.0 - value) + PALEST * value * value;
     let (a, b) = (chroma * libm::cos(TAU * turn), chroma * libm::sin(TAU * turn));
-    of_oklab(libm::cbrt(luminance_of(LIGHTEST * value)), a, b)
+    from_oklab(libm::cbrt(luminance_of(LIGHTEST * value)), a, b)
 }
 
-/// Relative luminance of a CIE lightness, 0 to 100.
+/// Relative luminance of a CIE lightness in [0, 100].
 fn luminance_of(lightness: f64) -> f64 {
     const KAPPA: f64 = 24_389.0 / 27.0;
     let root = (lightness + 16.0) / 116.0;
     if lightness > 8.0 { root * root * root } else { lightness / KAPPA }
 }
 
-fn of_oklab(lightness: f64, a: f64, b: f64) -> Vec3 {
+fn from_oklab(lightness: f64, a: f64, b: f64) -> Vec3 {
     let cube = |x: f64| x * x * x;
     let long = cube(lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
     let middle = cube(lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b);
@@ -41,26 +41,27 @@ mod tests {
     use crate::math::color::luminance;
 
     #[test]
-    fn larger_errors_are_lighter_and_the_ends_are_known() {
-        assert_eq!(color(0.0), Vec3::ZERO);
-        assert_eq!(color(-1.0), color(0.0));
-        assert_eq!(color(2.0), color(1.0));
-        assert!(luminance(color(1.0)) > 0.85, "{}", color(1.0));
+    fn lightness_increases_with_the_error() {
+        assert_eq!(error_color(0.0), Vec3::ZERO);
+        assert_eq!(error_color(-1.0), error_color(0.0));
+        assert_eq!(error_color(2.0), error_color(1.0));
+        assert!(luminance(error_color(1.0)) > 0.85, "{}", error_color(1.0));
         for step in 0..256 {
-            let [darker, lighter] = [step, step + 1].map(|step| luminance(color(f64::from(step) / 256.0)));
+            let [darker, lighter] =
+                [step, step + 1].map(|step| luminance(error_color(f64::from(step) / 256.0)));
             assert!(lighter > darker, "{step}: {darker} {lighter}");
         }
     }
 
     #[test]
-    fn hues_are_as_described() {
+    fn hues_match_the_documentation() {
         let is_largest = |value: f64, channel: usize| {
-            let color = color(value).to_array();
+            let color = error_color(value).to_array();
             color.iter().all(|other| *other <= color[channel])
         };
-        assert!(is_largest(0.15, 2), "purple: {}", color(0.15));
-        assert!(is_largest(0.5, 0), "red: {}", color(0.5));
-        let yellow = color(1.0);
+        assert!(is_largest(0.15, 2), "purple: {}", error_color(0.15));
+        assert!(is_largest(0.5, 0), "red: {}", error_color(0.5));
+        let yellow = error_color(1.0);
         assert!(yellow.x > yellow.z && yellow.y > yellow.z, "{yellow}");
     }
 }

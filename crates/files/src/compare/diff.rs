@@ -1,18 +1,18 @@
-//! Errors as pictures.
+//! Images that show errors.
 
 use rayon::prelude::*;
 
 use super::{Pair, colormap};
 use crate::film::RadianceImage;
 
-/// |a − b| of every channel, linear.
+/// |a − b| of each channel, linear.
 pub fn absolute(pair: &Pair) -> RadianceImage {
     let pixels = pair.a().pixels.par_iter().zip(&pair.b().pixels).map(|(a, b)| (*a - *b).abs());
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels: pixels.collect() }
 }
 
-/// FLIP of every pixel as a colour: black for 0, through purple, red and orange, to pale yellow for 1.
+/// FLIP of each pixel as a color: from black for 0 through purple, red and orange to pale yellow for 1.
 pub fn heat(pair: &Pair, flip: &[f32]) -> RadianceImage {
-    let pixels = flip.par_iter().map(|&error| colormap::color(f64::from(error))).collect();
+    let pixels = flip.par_iter().map(|&error| colormap::error_color(f64::from(error))).collect();
     RadianceImage { width: pair.a().width, height: pair.a().height, pixels }
 }

@@ -1,12 +1,13 @@
-//! Errors of displayed values, clamped sRGB without quantisation: PSNR of the channels, SSIM of the luma.
+//! Errors of displayed values (clamped sRGB without quantization): PSNR of the channels and SSIM of the luma.
 //!
-//! SSIM: Z. Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity" (2004): a Gaussian
-//! window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1; the mean over the windows that lie inside.
-//! Along a side of fewer than 11 pixels, windows are cut at its ends, and their weights still have a sum of one.
+//! SSIM follows Z. Wang et al., *Image Quality Assessment: From Error Visibility to Structural Similarity*
+//! (2004): a Gaussian window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1; the mean over the
+//! windows inside the image. If a side has fewer than 11 pixels, windows are clipped and their weights are
+//! renormalized.
 
 use rayon::prelude::*;
 
-use super::plane::{Plane, gaussian, normalised};
+use super::plane::{Plane, gaussian, normalized};
 use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
@@ -16,7 +17,7 @@ const RADIUS: usize = 5;
 const SIGMA: f64 = 1.5;
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
-/// Weights of red, green and blue in luma (ITU-R BT.709).
+/// Luma weights of red, green and blue (ITU-R BT.709).
 const LUMA: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
 pub(super) struct Display {
@@ -43,12 +44,12 @@ impl Sums {
 
 pub(super) fn measure(pair: &Pair) -> Display {
     let (width, height) = (pair.width(), pair.height());
-    let window = normalised(&gaussian(SIGMA, RADIUS));
-    let of_band = |band| {
+    let window = normalized(&gaussian(SIGMA, RADIUS));
+    let band_sums = |band| {
         let sums = tiles::of_band(band, width, height).map(|tile| tile_sums(pair, tile, &window));
         sums.fold(Sums::default(), Sums::plus)
     };
-    let bands: Vec<_> = (0..tiles::bands(height)).into_par_iter().map(of_band).collect();
+    let bands: Vec<_> = (0..tiles::bands(height)).into_par_iter().map(band_sums).collect();
     let sums = bands.into_iter().fold(Sums::default(), Sums::plus);
     let mean_square = sums.square / (3 * width * height) as f64;
     Display { psnr_db: -10.0 * libm::log10(mean_square), ssim: sums.ssim / sums.windows as f64 }
@@ -73,14 +74,14 @@ fn tile_sums(pair: &Pair, tile: Rect, window: &[f64]) -> Sums {
     sums
 }
 
-/// Wang et al., equation 13, from the means of a, b, of a², b² and of ab.
+/// Wang et al., equation 13, from the means of a, b, a², b² and ab.
 fn similarity([a, b]: [f64; 2], [aa, bb]: [f64; 2], ab: f64) -> f64 {
     let (variances, covariance) = (aa - a * a + (bb - b * b), ab - a * b);
     (2.0 * a * b + C1) * (2.0 * covariance + C2) / ((a * a + b * b + C1) * (variances + C2))
 }
 
-/// Squared differences of the tile's channels, and the lumas of the tile and of [`RADIUS`] pixels around it, 0 outside
-/// of the picture.
+/// Sum of squared differences of the tile's channels, and luma of the tile with a margin of [`RADIUS`]
+/// pixels. Pixels outside the image are 0.
 fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     let side = |length: u32| length as usize + 2 * RADIUS;
     let mut lumas =
@@ -102,22 +103,22 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     (square, lumas)
 }
 
-/// Converts a position in the tile with its margin to one in the picture. `None` if it is outside.
+/// Converts a position in the tile with its margin to a position in the image. `None` if it is outside.
 fn inside(start: u32, offset: usize, length: usize) -> Option<usize> {
-    (start as usize + offset).checked_sub(RADIUS).filter(|&place| place < length)
+    (start as usize + offset).checked_sub(RADIUS).filter(|&position| position < length)
 }
 
 fn is_inner(offset: usize, length: u32) -> bool {
     (RADIUS..RADIUS + length as usize).contains(&offset)
 }
 
-/// For each position of the tile along one side, the weights of its window inside of the picture. `None` if the window
-/// does not count.
+/// For each position of the tile along one side, the sum of its window's weights inside the image. `None` if
+/// the window is excluded.
 fn weights_inside(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
-    let weight = |place: usize| {
-        let is_whole = place >= RADIUS && place + RADIUS < length;
-        let taps = (place..).zip(window).filter(|(tap, _)| (RADIUS..RADIUS + length).contains(tap));
-        (is_whole || length < window.len()).then(|| taps.map(|(_, weight)| weight).sum())
+    let weight = |position: usize| {
+        let is_complete = position >= RADIUS && position + RADIUS < length;
+        let taps = (position..).zip(window).filter(|(tap, _)| (RADIUS..RADIUS + length).contains(tap));
+        (is_complete || length < window.len()).then(|| taps.map(|(_, weight)| weight).sum())
     };
     (0..count).map(|offset| weight((start + offset) as usize)).collect()
 }

@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
-/// The trimmed mean leaves out one in so many pixels.
+/// The trimmed mean drops one in this many pixels.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct Linear {
@@ -19,7 +19,7 @@ pub(super) struct Linear {
     pub(super) luminances: [f64; 2],
 }
 
-/// Sums over some pixels.
+/// Sums over pixels.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     square: f64,
@@ -27,7 +27,7 @@ struct Sums {
     max: f64,
     /// Column and row of the first pixel with the largest difference.
     max_at: [u32; 2],
-    /// Sums of the luminances of both pictures.
+    /// Sums of the luminance of both images.
     luminances: DVec2,
 }
 
@@ -58,10 +58,10 @@ pub(super) fn measure(pair: &Pair) -> Linear {
     }
 }
 
-/// Results of `of` for each row, in their order.
-fn map_rows<T: Send>(pair: &Pair, of: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
+/// Applies `row` to each row, in order.
+fn map_rows<T: Send>(pair: &Pair, row: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
     let a = pair.a().pixels.par_chunks(pair.width());
-    a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| of(a, b)).collect()
+    a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| row(a, b)).collect()
 }
 
 fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
@@ -101,6 +101,6 @@ fn trimmed(pair: &Pair, dropped: usize) -> f64 {
     });
     let (sum, count) =
         rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
-    // Several values may equal the least dropped one: some of these stay.
+    // Several values may equal the smallest dropped one. Keep as many of these as necessary.
     (sum + (kept - count) as f64 * least_dropped) / kept as f64
 }

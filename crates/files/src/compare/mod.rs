@@ -1,8 +1,8 @@
-//! The error of a picture against a reference.
+//! Errors of an image against a reference.
 //!
-//! Linear values give RMSE, relMSE and the largest difference; displayed values, clamped sRGB, give PSNR, SSIM and
-//! FLIP. All sums are in double precision, in an order that does not depend on the number of threads. The threads of
-//! the caller's pool share the work.
+//! Linear values give RMSE, relMSE and the largest difference; displayed values (clamped sRGB) give PSNR,
+//! SSIM and FLIP. Sums use double precision, in an order that does not depend on the number of threads. The
+//! work runs in the caller's thread pool.
 
 mod bias;
 mod colormap;
@@ -13,49 +13,49 @@ mod linear;
 mod pair;
 mod plane;
 mod tiles;
-mod two;
+mod two_references;
 
 pub use bias::Bias;
 pub use diff::{absolute, heat};
 pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
-pub use two::TwoReferences;
+pub use two_references::TwoReferences;
 
-/// Errors of the first picture of a pair against the second, its reference. Means are over pixels and channels.
+/// Errors of the first image of a pair against the second, the reference. Means are over pixels and channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Errors {
     /// √mean (a − b)², linear.
     pub rmse: f64,
     /// mean (a − b)²/(b² + 0.01), linear.
     pub relmse: f64,
-    /// relMSE without the thousandth of the pixels (rounded down) that have the largest values.
+    /// relMSE without the 0.1 % of pixels (rounded down) with the largest values.
     pub relmse_trimmed: f64,
-    /// Number of pixels that it leaves out.
+    /// Number of pixels excluded from the trimmed relMSE.
     pub dropped_pixels: u64,
     /// max |a − b|, linear.
     pub max: f64,
-    /// Column and row, from 0 at the top left, of the first pixel with the largest difference.
+    /// Column and row of the first pixel with the largest difference, from (0, 0) at the top left.
     pub max_at: [u32; 2],
-    /// Mean luminance of both, linear.
+    /// Mean luminance of both images, linear.
     pub luminances: [f64; 2],
-    /// Peak signal to noise ratio of clamped sRGB, dB; infinite for equal pictures.
+    /// Peak signal-to-noise ratio of clamped sRGB in dB, infinite for equal images.
     pub psnr_db: f64,
-    /// Structural similarity of the luma of clamped sRGB, 1 for equal pictures.
+    /// Structural similarity of the luma of clamped sRGB, 1 for equal images.
     pub ssim: f64,
-    /// Mean of [`Measured::flip`], 0 for equal pictures, at most 1.
+    /// Mean of [`Measured::flip`], from 0 for equal images to 1.
     pub flip: f64,
 }
 
-/// Measurements of a pair.
+/// Measurements of a pair of images.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// The figures.
+    /// Error metrics.
     pub errors: Errors,
-    /// FLIP of every pixel, in [0, 1], rows from the top.
+    /// FLIP of each pixel, in [0, 1], in rows from the top.
     pub flip: Vec<f32>,
 }
 
-/// Measures everything.
+/// Measures all errors.
 pub fn measure(pair: &Pair) -> Measured {
     let linear = linear::measure(pair);
     let display = display::measure(pair);

@@ -1,4 +1,4 @@
-//! Two pictures that can be compared.
+//! A pair of images to compare.
 
 use std::path::{Path, PathBuf};
 
@@ -8,16 +8,16 @@ use crate::control::{CancelToken, ignore_progress};
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// Reasons for which two files cannot be compared.
+/// Reason for which two files cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// A file could not be read, or is not a picture.
+    /// A file could not be read or is not an image.
     #[error(transparent)]
     File(#[from] AssetError),
     /// Some values are not finite.
     #[error(
-        "{}: {nan} of its values are NaN and {infinite} infinite, the first at pixel ({}, {}), counted from (0, 0) \
-         at the top left, in {channel}: no error can be measured; find what made them, or render it again",
+        "{}: {nan} NaN and {infinite} infinite values, the first at pixel ({}, {}) (column and row from the top left) in \
+         {channel}; errors cannot be measured",
         path.display(), at[0], at[1]
     )]
     NotFinite {
@@ -29,24 +29,23 @@ pub enum CompareError {
         infinite: u64,
         /// Column and row of the first such value.
         at: [u32; 2],
-        /// Channel of the first such value, in words.
+        /// Channel of the first such value.
         channel: &'static str,
     },
-    /// The pictures have two sizes.
+    /// The images have different sizes.
     #[error(
-        "{} has {}×{} pixels and {} {}×{}: only pictures of one size can be compared; render one of them at the size \
-         of the other (--width, --height)",
+        "{} has {}×{} pixels but {} has {}×{}; images must have the same size (--width, --height)",
         paths[0].display(), sizes[0][0], sizes[0][1], paths[1].display(), sizes[1][0], sizes[1][1]
     )]
     Sizes {
-        /// Both files.
+        /// The files.
         paths: [PathBuf; 2],
-        /// Their columns and rows.
+        /// Their widths and heights.
         sizes: [[u32; 2]; 2],
     },
 }
 
-/// Two pictures of one size that have pixels, every value of which is finite.
+/// Two nonempty images of the same size with only finite values.
 #[derive(Clone, Debug)]
 pub struct Pair {
     a: RadianceImage,
@@ -55,21 +54,21 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// Checks the picture and its reference; messages call them by these names.
+    /// Checks an image and its reference. Messages use the given names.
     ///
     /// # Errors
-    /// All faults of both.
+    /// All errors of both images.
     pub fn new(names: [&Path; 2], a: RadianceImage, b: RadianceImage) -> Result<Self, Vec<CompareError>> {
         let errors = [check_finite(names[0], &a), check_finite(names[1], &b), check_sizes(names, &a, &b)];
         let errors: Vec<_> = errors.into_iter().flatten().collect();
         if errors.is_empty() { Ok(Self { a, b, warnings: Vec::new() }) } else { Err(errors) }
     }
 
-    /// Reads two image files of any format that a texture may have: whole numbers are read as sRGB, floats as linear;
-    /// alpha is left out.
+    /// Reads two image files in any format that textures support: integers as sRGB, floats as linear, without
+    /// alpha.
     ///
     /// # Errors
-    /// All faults of both.
+    /// All errors of both images.
     pub fn load(a: &Path, b: &Path) -> Result<Self, Vec<CompareError>> {
         match (read(a), read(b)) {
             (Ok((first, mut warnings)), Ok((second, more))) => {
@@ -83,7 +82,7 @@ impl Pair {
         }
     }
 
-    /// The picture under test.
+    /// The image to measure.
     pub fn a(&self) -> &RadianceImage {
         &self.a
     }
@@ -93,17 +92,17 @@ impl Pair {
         &self.b
     }
 
-    /// Warnings about parts of the files that are ignored.
+    /// Warnings about ignored parts of the files.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Columns of both.
+    /// Width of both images.
     pub fn width(&self) -> usize {
         self.a.width as usize
     }
 
-    /// Rows of both.
+    /// Height of both images.
     pub fn height(&self) -> usize {
         self.a.height as usize
     }

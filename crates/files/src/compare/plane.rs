@@ -1,6 +1,6 @@
-//! One number for each pixel of a tile, and separable filters.
+//! Scalar planes of a tile, and separable filters.
 
-/// Numbers in rows.
+/// Scalars in row-major order.
 #[derive(Clone, Debug)]
 pub(super) struct Plane {
     pub(super) width: usize,
@@ -13,19 +13,19 @@ impl Plane {
         Self { width, height, values: vec![0.0; width * height] }
     }
 
-    /// The product of two planes, value by value.
+    /// Elementwise product of two planes.
     pub(super) fn times(&self, other: &Self) -> Self {
         let values = self.values.iter().zip(&other.values).map(|(a, b)| a * b).collect();
         Self { values, ..*self }
     }
 
-    /// Weighted sums along rows and columns at pixels for which all taps lie inside: the plane shrinks by `taps − 1` on
-    /// both sides.
+    /// Filters rows and columns, at pixels where all taps are inside: the plane shrinks by `taps − 1` in both
+    /// dimensions.
     pub(super) fn filtered(&self, along_rows: &[f64], along_columns: &[f64]) -> Self {
         self.along_rows(along_rows).along_columns(along_columns)
     }
 
-    /// Sums over neighbours in a row.
+    /// Filters along rows.
     pub(super) fn along_rows(&self, taps: &[f64]) -> Self {
         let mut out = Self::zero(self.width + 1 - taps.len(), self.height);
         for (row, out) in self.values.chunks_exact(self.width).zip(out.values.chunks_exact_mut(out.width)) {
@@ -35,7 +35,7 @@ impl Plane {
         out
     }
 
-    /// Sums over neighbours in a column.
+    /// Filters along columns.
     pub(super) fn along_columns(&self, taps: &[f64]) -> Self {
         let mut out = Self::zero(self.width, self.height + 1 - taps.len());
         let rows: Vec<_> = self.values.chunks_exact(self.width).collect();
@@ -46,7 +46,7 @@ impl Plane {
     }
 }
 
-/// Adds the rows, each times its tap; four at once, so that sums are loaded and stored less often.
+/// Adds rows multiplied by their taps. Four at a time, to load and store the sums less often.
 fn add(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
     let (fours, rest) = taps.as_chunks();
     let (fours_of_rows, rest_of_rows) = rows.as_chunks();
@@ -63,7 +63,7 @@ fn add(sums: &mut [f64], rows: &[&[f64]], taps: &[f64]) {
     }
 }
 
-/// exp(−x²/2σ²) at whole numbers from −radius to radius, pixels.
+/// exp(−x²/2σ²) at integers from −radius to radius, in pixels.
 pub(super) fn gaussian(sigma: f64, radius: usize) -> Vec<f64> {
     offsets(radius).map(|x| libm::exp(-x * x / (2.0 * sigma * sigma))).collect()
 }
@@ -74,8 +74,8 @@ pub(super) fn offsets(radius: usize) -> impl Iterator<Item = f64> {
     (-radius..=radius).map(f64::from)
 }
 
-/// The same taps with a sum of one.
-pub(super) fn normalised(taps: &[f64]) -> Vec<f64> {
+/// Scales taps to a sum of 1.
+pub(super) fn normalized(taps: &[f64]) -> Vec<f64> {
     let sum: f64 = taps.iter().sum();
     taps.iter().map(|tap| tap / sum).collect()
 }
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn filters_weigh_neighbours() {
+    fn filters_weight_neighbors() {
         let plane = Plane { width: 4, height: 3, values: (0..12).map(f64::from).collect() };
         let rows = plane.along_rows(&[1.0, 10.0, 100.0]);
         assert_eq!((rows.width, rows.height), (2, 3));
@@ -101,8 +101,8 @@ mod tests {
     }
 
     #[test]
-    fn gaussians_are_known() {
-        let taps = normalised(&gaussian(1.5, 5));
+    fn gaussian_taps_match_known_values() {
+        let taps = normalized(&gaussian(1.5, 5));
         assert_eq!(taps.len(), 11);
         assert!((taps[5] - 0.266_011_7).abs() < 1e-7 && (taps[0] - 0.001_028_4).abs() < 1e-7, "{taps:?}");
     }

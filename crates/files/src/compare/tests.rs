@@ -4,10 +4,10 @@ use super::*;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// A picture by a formula of column, row and channel.
+/// An image defined by a formula of column, row and channel.
 fn image(width: u32, height: u32, value: impl Fn(u32, u32, u32) -> f32) -> RadianceImage {
-    let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-    let pixels = places.map(|(x, y)| Vec3::new(value(x, y, 0), value(x, y, 1), value(x, y, 2))).collect();
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let pixels = pixels.map(|(x, y)| Vec3::new(value(x, y, 0), value(x, y, 1), value(x, y, 2))).collect();
     RadianceImage { width, height, pixels }
 }
 
@@ -20,7 +20,7 @@ fn errors(a: &RadianceImage, b: &RadianceImage) -> Errors {
 }
 
 #[test]
-fn warnings_about_the_files_are_kept() {
+fn warnings_about_the_files_are_returned() {
     let folder = tempfile::tempdir().expect("a folder");
     let [plain, animated] = ["a.png", "b.png"].map(|name| folder.path().join(name));
     for (path, frames) in [(&plain, 1), (&animated, 3)] {
@@ -41,23 +41,23 @@ fn warnings_about_the_files_are_kept() {
     }
 }
 
-/// Hashed values in [0, 1] with noise of ±1/8, some of it outside of the range of a display.
+/// Hashed values in [0, 1] with noise of ±1/8, partly outside the display range.
 fn noisy(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| ((x * 7 + y * 13 + c * 29) * (x + 2 * y + 3) % 257) as f32 / 256.0;
     let noise = |x, y, c| (((x * 5 + y * 11 + c * 17) % 33) as f32 - 16.0) / 128.0;
     [image(width, height, |x, y, c| clean(x, y, c) + noise(x, y, c)), image(width, height, clean)]
 }
 
-/// Ramps and a checkerboard; every third diagonal is brighter by a quarter, and few pixels by 40.
+/// Ramps and a checkerboard. Every third diagonal is brighter by a quarter, and a few pixels by 40.
 fn edges(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| {
         ((x + 2 * y + 40 * c) % 512) as f32 / 1024.0 + if (x / 16 + y / 16) % 2 == 0 { 0.25 } else { 0.0 }
     };
-    let spoilt = |x, y, c| {
+    let distorted = |x, y, c| {
         let factor = if (x + y) % 3 == 0 { 1.25 } else { 1.0 };
         clean(x, y, c) * factor + if (x * 31 + y * 17) % 997 == 0 { 40.0 } else { 0.0 }
     };
-    [image(width, height, spoilt), image(width, height, clean)]
+    [image(width, height, distorted), image(width, height, clean)]
 }
 
 #[track_caller]
@@ -72,7 +72,7 @@ struct Expected {
     psnr: f64,
     ssim: f64,
     flip: f64,
-    /// FLIP by the published program, in single precision.
+    /// FLIP of the published program, in single precision.
     published_flip: f64,
 }
 
@@ -91,13 +91,13 @@ fn assert_measures([a, b]: &[RadianceImage; 2], expected: &Expected) {
     assert_eq!((errors.max_at, errors.dropped_pixels), (expected.max_at, expected.dropped));
 }
 
-// The figures were computed by numpy in double precision on the same formulas: SSIM window by window, and the same as
-// `structural_similarity` of scikit-image 0.26 (gaussian_weights, sigma 1.5, no sample covariance) where the picture
-// has room for a window; FLIP with the two-dimensional kernels of the paper; `published_flip` is by flip-evaluator 1.7
-// of the paper's authors (LDR, linear input, 67 pixels a degree).
+// Expected values were computed with numpy in double precision: SSIM window by window, in agreement with
+// `structural_similarity` of scikit-image 0.26 (gaussian_weights, sigma 1.5, no sample covariance) where the
+// image is large enough; FLIP with the 2D kernels of the paper. `published_flip` was computed with
+// flip-evaluator 1.7 by the authors of the paper (LDR, linear input, 67 pixels per degree).
 
 #[test]
-fn noise_as_numpy_and_published_programs_have_it() {
+fn errors_of_noise_match_numpy() {
     let expected = Expected {
         linear: [0.074_452_040_028_3, 0.087_685_495_302, 0.087_685_495_302, 0.125],
         max_at: [0, 0],
@@ -111,7 +111,7 @@ fn noise_as_numpy_and_published_programs_have_it() {
 }
 
 #[test]
-fn a_picture_of_several_tiles_with_bright_pixels_as_numpy_and_published_programs_have_it() {
+fn errors_of_several_tiles_match_numpy() {
     let expected = Expected {
         linear: [1.326_208_766_31, 19.568_535_989_9, 0.427_631_782_818, 40.158_447_265_6],
         max_at: [59, 127],
@@ -125,7 +125,7 @@ fn a_picture_of_several_tiles_with_bright_pixels_as_numpy_and_published_programs
 }
 
 #[test]
-fn pictures_smaller_than_a_window_as_numpy_and_published_programs_have_it() {
+fn errors_of_tiny_images_match_numpy() {
     let small = Expected {
         linear: [0.075_368_020_683, 0.125_544_632_27, 0.125_544_632_27, 0.125],
         max_at: [0, 0],
@@ -147,10 +147,10 @@ fn pictures_smaller_than_a_window_as_numpy_and_published_programs_have_it() {
     };
     assert_measures(&noisy(40, 1), &row);
     let [a, b] = noisy(1, 1);
-    let one = errors(&a, &b);
-    assert_near("relMSE", one.relmse, 0.530_694_347_929);
-    assert_near("SSIM", one.ssim, 0.999_999_774_029);
-    assert_near("FLIP", one.flip, 0.233_769_835_862);
+    let pixel = errors(&a, &b);
+    assert_near("relMSE", pixel.relmse, 0.530_694_347_929);
+    assert_near("SSIM", pixel.ssim, 0.999_999_774_029);
+    assert_near("FLIP", pixel.flip, 0.233_769_835_862);
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn flip_of_single_pixels() {
 }
 
 #[test]
-fn equal_pictures_have_no_error() {
+fn equal_images_have_no_error() {
     for (width, height) in [(1, 1), (1, 30), (30, 1), (11, 11), (10, 12), (129, 2), (40, 131)] {
         let [_, b] = noisy(width, height);
         let Errors { rmse, relmse, relmse_trimmed, max, psnr_db, ssim, flip, .. } = errors(&b, &b);
@@ -173,7 +173,7 @@ fn equal_pictures_have_no_error() {
 }
 
 #[test]
-fn what_is_symmetric_and_what_is_not() {
+fn only_relmse_depends_on_the_order() {
     let [a, b] = edges(60, 40);
     let (there, back) = (errors(&a, &b), errors(&b, &a));
     assert_eq!((there.psnr_db, there.rmse, there.max), (back.psnr_db, back.rmse, back.max));
@@ -182,49 +182,49 @@ fn what_is_symmetric_and_what_is_not() {
 }
 
 #[test]
-fn relmse_of_bright_pictures_does_not_change_with_their_scale() {
+fn relmse_of_bright_images_is_scale_invariant() {
     let [a, b] = edges(60, 40);
     let scaled =
         |image: &RadianceImage, factor: f32| image.pixels.iter().map(|p| (*p + 0.5) * factor).collect();
-    let of = |factor| {
+    let scaled_errors = |factor| {
         let [a, b] = [&a, &b].map(|image| RadianceImage { pixels: scaled(image, factor), ..*image });
         errors(&a, &b)
     };
-    let (large, larger) = (of(1e4), of(1e6));
+    let (large, larger) = (scaled_errors(1e4), scaled_errors(1e6));
     assert!((large.relmse / larger.relmse - 1.0).abs() < 1e-7);
     assert!((larger.rmse / large.rmse - 100.0).abs() < 1e-4);
-    // Far below 0.1 the denominator is 0.01: the error falls with the square of the scale.
-    let (small, smaller) = (of(1e-5), of(1e-6));
+    // Far below 0.1 the denominator is 0.01, so the error is proportional to the squared scale.
+    let (small, smaller) = (scaled_errors(1e-5), scaled_errors(1e-6));
     assert!((small.relmse / smaller.relmse - 100.0).abs() < 1e-3, "{} {}", small.relmse, smaller.relmse);
 }
 
 #[test]
-fn known_values_by_hand() {
-    let grey = |value| image(20, 15, move |_, _, _| value);
-    let found = errors(&grey(0.5), &grey(0.25));
+fn constant_images_have_known_errors() {
+    let gray = |value| image(20, 15, move |_, _, _| value);
+    let found = errors(&gray(0.5), &gray(0.25));
     assert!((found.rmse - 0.25).abs() < 1e-12 && (found.max - 0.25).abs() < 1e-12);
     assert!((found.relmse - 0.0625 / 0.0725).abs() < 1e-12);
     assert_eq!(found.max_at, [0, 0]);
-    let black_and_white = errors(&grey(1.0), &grey(0.0));
+    let black_and_white = errors(&gray(1.0), &gray(0.0));
     assert!(black_and_white.psnr_db.abs() < 1e-9, "{}", black_and_white.psnr_db);
     assert!((black_and_white.relmse - 100.0).abs() < 1e-9);
-    // C₁/(1 + C₁): two constants, one of them 0.
+    // C₁/(1 + C₁), for two constants of which one is 0.
     assert!((black_and_white.ssim - 1e-4 / 1.0001).abs() < 1e-9);
-    let beyond = errors(&grey(7.0), &grey(1.0));
-    assert_eq!((beyond.psnr_db, beyond.flip), (f64::INFINITY, 0.0), "a display shows the same");
-    let negative = errors(&grey(-0.5), &grey(0.0));
+    let beyond = errors(&gray(7.0), &gray(1.0));
+    assert_eq!((beyond.psnr_db, beyond.flip), (f64::INFINITY, 0.0), "displayed identically");
+    let negative = errors(&gray(-0.5), &gray(0.0));
     assert_eq!((negative.psnr_db, negative.max), (f64::INFINITY, 0.5));
 }
 
 #[test]
-fn green_against_blue_is_the_largest_colour_error() {
+fn green_and_blue_have_the_largest_flip_error() {
     let only = |channel| image(30, 30, move |_, _, c| if c == channel { 1.0 } else { 0.0 });
     let found = errors(&only(1), &only(2));
     assert!((found.flip - 1.0).abs() < 1e-6, "{}", found.flip);
 }
 
 #[test]
-fn one_worst_pixel_of_a_thousand_is_dropped_and_ties_stay() {
+fn trimming_drops_one_pixel_in_a_thousand() {
     let black = image(50, 40, |_, _, _| 0.0);
     let with = |count: u32| image(50, 40, move |x, y, _| if y == 39 && x < count { 3.0 } else { 0.0 });
     let two = errors(&with(2), &black);
@@ -234,45 +234,46 @@ fn one_worst_pixel_of_a_thousand_is_dropped_and_ties_stay() {
     assert!((five - 3.0 * 900.0 / 1998.0).abs() < 1e-9, "{five}");
     let huge = image(50, 40, |x, y, _| if y == 0 && x < 2 { f32::MAX } else { 0.1 });
     let trimmed = errors(&huge, &black).relmse_trimmed;
-    assert!((trimmed - 1.0).abs() < 1e-6, "nothing of the dropped pixels is left: {trimmed}");
+    assert!((trimmed - 1.0).abs() < 1e-6, "the dropped pixels have no effect: {trimmed}");
 }
 
 #[test]
-fn the_number_of_threads_changes_no_bit() {
+fn results_do_not_depend_on_thread_count() {
     let [a, b] = edges(300, 270);
     let pair = pair(a, b);
-    let by = |threads| {
+    let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         let Measured { errors, flip } = pool.install(|| measure(&pair));
         (errors, flip)
     };
-    let one = by(1);
+    let expected = with(1);
     for threads in [2, 7] {
-        assert_eq!(by(threads), one, "{threads} threads");
+        assert_eq!(with(threads), expected, "{threads} threads");
     }
 }
 
 #[test]
-fn pictures_that_cannot_be_compared_are_told_with_places() {
-    let says = |a: RadianceImage, b: RadianceImage| {
-        let errors = Pair::new([Path::new("a.exr"), Path::new("b.exr")], a, b).expect_err("no pair");
-        errors.iter().map(ToString::to_string).collect::<Vec<_>>()
+fn incomparable_images_are_rejected() {
+    let rejected = |a: RadianceImage, b: RadianceImage| {
+        Pair::new([Path::new("a.exr"), Path::new("b.exr")], a, b).expect_err("no pair")
     };
-    let grey = |width, height| image(width, height, |_, _, _| 0.5);
-    let sizes = says(grey(4, 3), grey(3, 4));
-    assert_eq!(sizes.len(), 1);
-    assert!(sizes[0].starts_with("a.exr has 4×3 pixels and b.exr 3×4: "), "{sizes:?}");
-    let mut bad = grey(4, 3);
+    let gray = |width, height| image(width, height, |_, _, _| 0.5);
+    let errors = rejected(gray(4, 3), gray(3, 4));
+    assert!(matches!(errors[..], [CompareError::Sizes { sizes: [[4, 3], [3, 4]], .. }]), "{errors:?}");
+    let mut bad = gray(4, 3);
     bad.pixels[6].y = f32::NAN;
     bad.pixels[7] = Vec3::new(f32::INFINITY, f32::NEG_INFINITY, f32::NAN);
-    let both = says(bad.clone(), bad);
-    assert_eq!(both.len(), 2);
-    let start = "b.exr: 2 of its values are NaN and 2 infinite, the first at pixel (2, 1), ";
-    assert!(both[1].starts_with(start) && both[1].contains("in green"), "{both:?}");
+    let errors = rejected(bad.clone(), bad);
+    assert_eq!(errors.len(), 2);
+    let CompareError::NotFinite { path, nan: 2, infinite: 2, at: [2, 1], channel: "green" } = &errors[1]
+    else {
+        panic!("{errors:?}")
+    };
+    assert_eq!(path, Path::new("b.exr"));
 }
 
 #[test]
-fn the_error_as_a_picture() {
+fn error_images_show_the_largest_error() {
     let [a, b] = edges(20, 13);
     let pair = pair(a, b);
     let measured = measure(&pair);

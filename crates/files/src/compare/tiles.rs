@@ -1,16 +1,16 @@
-//! A picture in pieces that fit into a cache: the same pieces whatever the number of threads.
+//! Divides an image into cache-sized tiles, independently of the number of threads.
 
 use crate::film::Rect;
 
-/// Columns and rows of a tile.
+/// Width and height of a tile.
 pub(super) const SIDE: usize = 128;
 
-/// Number of bands: rows of tiles.
+/// Number of bands (rows of tiles).
 pub(super) fn bands(height: usize) -> usize {
     height.div_ceil(SIDE)
 }
 
-/// The tiles of one band, from left to right.
+/// Tiles of a band, from left to right.
 pub(super) fn of_band(band: usize, width: usize, height: usize) -> impl Iterator<Item = Rect> {
     let y = band * SIDE;
     (0..width.div_ceil(SIDE)).map(move |column| {

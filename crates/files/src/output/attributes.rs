@@ -1,5 +1,5 @@
-//! Attributes of a file beside its bytes, carried over to the file that replaces it: owner, group, access list,
-//! extended attributes, permissions.
+//! Carries file attributes over to the file that replaces it: owner, group, access list, extended attributes,
+//! permissions.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
@@ -12,27 +12,26 @@ use xattr::FileExt;
 #[cfg(target_os = "linux")]
 use super::flags::Flags;
 
-/// The access list of POSIX.1e, as Linux keeps it (acl(5)).
+/// POSIX.1e access control list, as stored by Linux (acl(5)).
 const ACCESS_LIST: &str = "system.posix_acl_access";
-/// Attributes that belong to the old bytes, or that the system writes by itself.
-const NOT_CARRIED: [&str; 4] =
-    ["security.capability", "security.evm", "security.ima", "com.apple.provenance"];
+/// Attributes that describe the old bytes or are written by the system.
+const EXCLUDED: [&str; 4] = ["security.capability", "security.evm", "security.ima", "com.apple.provenance"];
 
-/// Rights of the owner alone.
-const OWNER: u32 = 0o700;
-/// Rights of the owner and of all others, but for the group's.
-const NOT_GROUP: u32 = 0o707;
+/// Permissions of the owner.
+const OWNER_BITS: u32 = 0o700;
+/// Permissions of everyone except the group.
+const NON_GROUP_BITS: u32 = 0o707;
 
-/// Policy for a file that would lose some of its attributes when it is replaced.
+/// What to do if replacing a file would lose some of its attributes.
 #[derive(Clone, Copy)]
 pub enum Losses<'a> {
-    /// It is replaced, and a sentence reports the losses; the new file never gives anybody more rights.
-    Told(&'a dyn Fn(String)),
-    /// It is not replaced.
-    Refused,
+    /// Replace it and report the losses in a sentence. The new file never grants additional permissions.
+    Report(&'a dyn Fn(String)),
+    /// Do not replace it.
+    Refuse,
 }
 
-/// Attributes of the replaced file.
+/// Attributes of the file to replace.
 #[derive(Debug)]
 pub(super) struct Attributes {
     uid: u32,
@@ -40,21 +39,21 @@ pub(super) struct Attributes {
     mode: u32,
     #[cfg(target_os = "linux")]
     flags: Flags,
-    /// Names and values; the access list comes last, as it may take rights away.
+    /// Names and values. The access list comes last because it may remove permissions.
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
 }
 
-/// Attributes that the new file lacks, and the permissions that are safe without them.
+/// Attributes that could not be carried over, and permissions that are safe without them.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Carried {
-    /// The lost attributes in words, such as `its owner`.
+    /// Descriptions of the lost attributes, such as `its owner`.
     pub(super) lost: Vec<String>,
     mode: u32,
 }
 
 impl Attributes {
-    /// Reads the attributes of the file.
-    pub(super) fn of(path: &Path, metadata: &fs::Metadata) -> Self {
+    /// Reads the attributes of a file.
+    pub(super) fn read(path: &Path, metadata: &fs::Metadata) -> Self {
         let mut named = named(path);
         named.sort_by_key(|(name, _)| name == ACCESS_LIST);
         Self {
@@ -62,15 +61,15 @@ impl Attributes {
             gid: metadata.gid(),
             mode: metadata.mode() & 0o7777,
             #[cfg(target_os = "linux")]
-            flags: Flags::of(path),
+            flags: Flags::read(path),
             named,
         }
     }
 
-    /// Gives all attributes but the permissions to a new file that only its owner can read so far.
+    /// Applies all attributes except the permissions to a new file that only its owner can access yet.
     pub(super) fn carry_over(&self, new: &File) -> Carried {
         let mut carried = Carried { lost: Vec::new(), mode: self.mode };
-        // Start while the new file is this user's own.
+        // Set the flags while this user owns the new file.
         #[cfg(target_os = "linux")]
         if !self.flags.carry_over(new) {
             carried.lost.push("its flags (chattr)".to_owned());
@@ -86,19 +85,19 @@ impl Attributes {
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
             return;
         }
-        // Every member of the group can at least keep the group.
+        // Any member of the group can at least keep the group.
         let _ = fchown(new, None, Some(self.gid));
         let (uid, gid) = ids().unwrap_or((u32::MAX, u32::MAX));
-        // Set-user-ID and set-group-ID would belong to another user.
+        // Drop set-user-ID and set-group-ID, which would apply to another user.
         carried.mode &= 0o777;
         if uid != self.uid {
             carried.lost.push("its owner".to_owned());
         }
         if gid != self.gid {
             carried.lost.push("its group".to_owned());
-            // Members of the new group had the rights of all others before.
-            let of_others = (carried.mode & 0o007) << 3;
-            carried.mode &= NOT_GROUP | of_others;
+            // Give the new group the permissions that its members had before, those of others.
+            let others_bits = (carried.mode & 0o007) << 3;
+            carried.mode &= NON_GROUP_BITS | others_bits;
         }
     }
 
@@ -109,7 +108,7 @@ impl Attributes {
                 carried.lose(name);
             }
         }
-        // A folder gives new files a list of its own: replace or remove it.
+        // New files may inherit an access list from their folder. Replace or remove it.
         let has_list = self.named.iter().any(|(name, _)| name == ACCESS_LIST);
         let is_inherited = || matches!(new.get_xattr(ACCESS_LIST), Ok(Some(_)));
         if !has_list && is_inherited() && new.remove_xattr(ACCESS_LIST).is_err() {
@@ -119,15 +118,15 @@ impl Attributes {
 }
 
 impl Carried {
-    /// Gives the new file its permissions: last, as writing takes some of them away.
-    pub(super) fn permit(&self, new: &File) -> io::Result<()> {
+    /// Applies the permissions. This must come last because writing clears some of them.
+    pub(super) fn apply_mode(&self, new: &File) -> io::Result<()> {
         new.set_permissions(fs::Permissions::from_mode(self.mode))
     }
 
     fn lose(&mut self, name: &OsStr) {
         if name == ACCESS_LIST {
-            // The file's group rights were the mask of its list.
-            self.mode &= OWNER;
+            // With an access list, the group bits are its mask. Without it, they would grant permissions.
+            self.mode &= OWNER_BITS;
             self.lost.push("its access list".to_owned());
         } else {
             self.lost.push(format!("its attribute {}", name.to_string_lossy()));
@@ -135,9 +134,9 @@ impl Carried {
     }
 }
 
-/// Extended attributes of a file; empty on file systems without them.
+/// Extended attributes of a file. Empty on file systems without them.
 fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
-    let is_carried = |name: &OsString| !NOT_CARRIED.iter().any(|known| name == known);
+    let is_carried = |name: &OsString| !EXCLUDED.iter().any(|known| name == known);
     let value = |name: OsString| match xattr::get_deref(path, &name) {
         Ok(None) => None,
         Ok(Some(value)) => Some((name, Ok(value))),
@@ -150,7 +149,7 @@ fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     }
 }
 
-/// Sets an attribute. One that is already there needs no right to be set.
+/// Sets an attribute, unless it already has this value, which needs no permission.
 fn set(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
     if new.get_xattr(name).is_ok_and(|now| now.as_deref() == Some(value)) {
         return Ok(());
@@ -167,7 +166,7 @@ mod tests {
         let found = new.metadata().expect("a file");
         let named = vec![(OsString::from(name), Ok(b"value".to_vec()))];
         #[cfg(target_os = "linux")]
-        let flags = Flags::of(Path::new("/nowhere"));
+        let flags = Flags::read(Path::new("/nowhere"));
         let (uid, gid) = (found.uid(), found.gid());
         let attributes = Attributes {
             uid,
@@ -181,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_kept_is_named() {
+    fn lost_attributes_are_named() {
         let (attributes, new) = attributes(0o664, "nonsense.of.no.space");
         let carried = attributes.carry_over(&new);
         assert_eq!(
@@ -191,12 +190,12 @@ mod tests {
     }
 
     #[test]
-    fn an_access_list_that_is_lost_leaves_rights_to_the_owner_alone() {
-        // These bytes are not a valid list.
+    fn a_lost_access_list_leaves_only_owner_access() {
+        // The value is not a valid list.
         let (attributes, new) = attributes(0o664, ACCESS_LIST);
         let carried = attributes.carry_over(&new);
         assert_eq!(carried, Carried { lost: vec!["its access list".to_owned()], mode: 0o600 });
-        carried.permit(&new).expect("permitted");
+        carried.apply_mode(&new).expect("permitted");
         assert_eq!(new.metadata().expect("a file").mode() & 0o777, 0o600);
     }
 }

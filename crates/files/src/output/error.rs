@@ -1,74 +1,74 @@
-//! Errors of writing a picture, with the way out.
+//! Errors of writing images, with advice.
 
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use nix::libc;
 
-use super::{Format, MovingFormat};
+use super::{AnimationFormat, Format};
 use crate::system::describe_error;
 
-/// Reasons for which a picture could not be written.
+/// Reason for which an image could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// The path has no ending.
-    #[error("cannot write {}: it has no ending that says its format; use one of {}", path.display(), Format::known_endings())]
-    NoEnding {
+    /// The path has no file name extension.
+    #[error("cannot write {}: it has no file extension; use one of {}", path.display(), Format::known_extensions())]
+    NoExtension {
         /// The path.
         path: PathBuf,
     },
-    /// No format has this ending.
-    #[error("cannot write {}: .{ending} is not a format that glimt writes; use one of {}", path.display(), Format::known_endings())]
-    UnknownEnding {
+    /// No format has this extension.
+    #[error("cannot write {}: .{extension} is not a supported format; use one of {}", path.display(), Format::known_extensions())]
+    UnknownExtension {
         /// The path.
         path: PathBuf,
-        /// Its ending, in small letters.
-        ending: String,
+        /// The extension in lower case.
+        extension: String,
     },
     /// The bit depth is neither 8 nor 16.
-    #[error("{bits} bits a channel are not possible; use 8 or 16")]
+    #[error("{bits} bits per channel are not supported; use 8 or 16")]
     BitDepth {
         /// Requested bits.
         bits: u8,
     },
-    /// The format cannot hold the picture.
+    /// The format cannot represent the image.
     #[error("a {format} file cannot {why}; use .png or .exr")]
     Unsuitable {
         /// The format.
         format: Format,
-        /// Property that the format lacks.
+        /// The missing capability.
         why: String,
     },
-    /// The format cannot hold the moving picture, or its encoder failed.
-    #[error("a moving {format} file {why}")]
-    Moving {
+    /// The format cannot represent the animation, or its encoder failed.
+    #[error("an animated {format} file {why}")]
+    Animation {
         /// The format.
-        format: MovingFormat,
+        format: AnimationFormat,
         /// The reason.
         why: String,
     },
     /// The encoder failed.
-    #[error("the picture could not be encoded as {format}: {why}")]
+    #[error("the image could not be encoded as {format}: {why}")]
     Encoder {
         /// The format.
         format: Format,
         /// Message of the encoder.
         why: String,
     },
-    /// A picture cannot be written to the target.
+    /// The target cannot be written.
     #[error("cannot write {}: {why}; {way_out}", path.display())]
     Target {
         /// The path as given.
         path: PathBuf,
-        /// Fault of the target.
+        /// The fault.
         why: String,
-        /// Advice for a way out.
+        /// Advice.
         way_out: &'static str,
     },
-    /// The existing file must stay.
+    /// The existing file must not be replaced.
     #[error("{reason}")]
     Refused {
-        /// The file, the reason, and the way out.
+        /// The file, the reason, and advice.
         reason: String,
     },
     /// The work was cancelled.
@@ -79,7 +79,7 @@ pub enum OutputError {
     File {
         /// The path as given.
         path: PathBuf,
-        /// Error of the system.
+        /// System error.
         source: io::Error,
     },
 }
@@ -96,18 +96,18 @@ impl OutputError {
 
 fn way_out(error: &io::Error) -> &'static str {
     match error.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free some space or choose another place",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "free some space or choose another location",
         ErrorKind::FileTooLarge => {
-            "raise the limit on the size of files (ulimit -f), choose another place or a smaller picture"
+            "raise the file size limit (ulimit -f), choose another location or a smaller image"
         }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
-            "allow writing there or choose another place"
+            "allow writing there or choose another location"
         }
         ErrorKind::InvalidFilename => "choose a shorter name",
-        ErrorKind::BrokenPipe => "whoever read it has ended; choose a file",
+        ErrorKind::BrokenPipe => "the reader has exited; write to a file",
         _ if matches!(error.raw_os_error(), Some(libc::EMFILE | libc::ENFILE)) => {
             "raise the limit on open files (ulimit -n)"
         }
-        _ => "choose another place",
+        _ => "choose another location",
     }
 }

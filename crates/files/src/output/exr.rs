@@ -1,5 +1,5 @@
-//! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP. Negative values, from filters with negative lobes, stay:
-//! without them dark noise would be too bright on average.
+//! OpenEXR: 32-bit float, linear, Rec. 709 primaries, lossless ZIP. Keeps negative values, which filters with
+//! negative lobes cause: clamping them would make dark noise too bright on average.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -16,16 +16,16 @@ use ::exr::prelude::{
 };
 use rayon::prelude::*;
 
-use super::stoppable::Stoppable;
+use super::cancellable::CancellableBuffer;
 use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// The attribute with the standard error of the picture's mean luminance, a double.
+/// Attribute (a double) with the standard error of the image's mean luminance.
 const MEAN_LUMINANCE_ERROR: &str = "glimtMeanLuminanceError";
 
-/// Standard error of the mean luminance according to an EXR file. Only for a regular file: a pipe can be read only
-/// once.
+/// Reads the standard error of the mean luminance from an EXR file. Only regular files are read, because a
+/// pipe can be read only once.
 pub fn mean_luminance_error(path: &Path) -> Option<f64> {
     let is_regular = path.metadata().is_ok_and(|found| found.is_file());
     let file = if is_regular { File::open(path).ok()? } else { return None };
@@ -48,7 +48,7 @@ pub(super) fn encode(
     file.attributes.chromaticities = Some(REC_709);
     let headers = file.layer_data.infer_headers(&file.attributes);
     let layers = file.layer_data.create_writer(&headers);
-    let mut bytes = Stoppable::new(token);
+    let mut bytes = CancellableBuffer::new(token);
     ::exr::block::write(&mut bytes, headers, true, |meta, file| {
         let block = |index| layers.extract_uncompressed_block(&meta.headers, index);
         compress(&meta, meta.collect_ordered_block_data(block), file)
@@ -57,7 +57,7 @@ pub(super) fn encode(
     Ok(bytes.into_bytes())
 }
 
-/// The channels of a picture and of its layers, `albedo.R` and so on.
+/// Channels of an image and of its layers (`albedo.R` and so on).
 fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSamples> {
     let channel = |name: &str, image: &RadianceImage, component: usize| {
         let samples = image.pixels.iter().map(|pixel| as_finite(pixel[component])).collect();
@@ -66,26 +66,28 @@ fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSam
     let names = ["R", "G", "B"];
     let mut channels: SmallVec<[_; 4]> =
         (0..3).map(|component| channel(names[component], image, component)).collect();
-    for LayerImage { name, channels: of_layer, image } in layers {
-        let of_layer = of_layer.iter().take(3).enumerate();
-        channels.extend(of_layer.map(|(component, of)| channel(&format!("{name}.{of}"), image, component)));
+    for LayerImage { name, channels: layer_channels, image } in layers {
+        let layer_channels = layer_channels.iter().take(3).enumerate();
+        channels.extend(
+            layer_channels.map(|(component, suffix)| channel(&format!("{name}.{suffix}"), image, component)),
+        );
     }
     AnyChannels::sort(channels)
 }
 
-/// Compresses in the caller's pool, or on the caller's thread outside of one. The encoder itself would make a pool with
-/// a thread for every core.
+/// Compresses in the caller's thread pool, or on the caller's thread outside a pool. The encoder itself would
+/// create a pool with a thread per core.
 fn compress(
     meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
     file: &mut impl ChunksWriter,
 ) -> UnitResult {
     let is_in_pool = rayon::current_thread_index().is_some();
-    let at_once = if is_in_pool { 4 * rayon::current_num_threads() } else { 1 };
+    let batch_size = if is_in_pool { 4 * rayon::current_num_threads() } else { 1 };
     let compressed =
         |(index, block): (usize, UncompressedBlock)| (index, block.compress_to_chunk(&meta.headers));
     loop {
-        let batch: Vec<_> = blocks.by_ref().take(at_once).collect();
+        let batch: Vec<_> = blocks.by_ref().take(batch_size).collect();
         if batch.is_empty() {
             return Ok(());
         }
@@ -100,7 +102,7 @@ fn compress(
     }
 }
 
-/// ITU-R BT.709 primaries, D65 white.
+/// ITU-R BT.709 primaries with D65 white.
 const REC_709: Chromaticities = Chromaticities {
     red: Vec2(0.64, 0.33),
     green: Vec2(0.30, 0.60),
@@ -108,9 +110,9 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// Attributes of the file. All metadata go into the standard `comments`, a line each: attributes of their own would
-/// come in the random order of the encoder's hash map, and the same picture would give different files. One attribute,
-/// which programs read, stands by itself.
+/// Attributes of the file. Metadata goes into the standard attribute `comments`, one line each: custom
+/// attributes would be written in the random order of the encoder's hash map, which would make files
+/// nondeterministic. The exception is a single attribute that programs read.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();
@@ -120,7 +122,7 @@ fn attributes(options: &EncodeOptions) -> LayerAttributes {
     LayerAttributes { software_name: Some(text(SOFTWARE)), comments, other, ..Default::default() }
 }
 
-/// The text as UTF-8, as other programs write and read it.
+/// Text as UTF-8, the encoding that other programs use.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

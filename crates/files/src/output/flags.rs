@@ -1,13 +1,13 @@
-//! Flags that chattr(1) sets, carried over to the file that takes a file's place.
+//! Carries file flags (chattr(1)) over to the file that replaces a file.
 
 use std::fs::File;
 use std::path::Path;
 
 use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
 
-/// Flags that a person sets and files keep. Append-only and immutable files are not replaced; the other flags are the
-/// system's own.
-const CARRIED: IFlags = IFlags::NODUMP
+/// Flags that users set. Append-only and immutable files are not replaced; all other flags are managed by the
+/// system.
+const USER_FLAGS: IFlags = IFlags::NODUMP
     .union(IFlags::NOATIME)
     .union(IFlags::SYNC)
     .union(IFlags::JOURNALING)
@@ -16,23 +16,23 @@ const CARRIED: IFlags = IFlags::NODUMP
     .union(IFlags::SECURE_REMOVAL)
     .union(IFlags::UNRM);
 
-/// The flags of a file; `None` if they cannot be read, or if its file system has none.
+/// Flags of a file. `None` if they cannot be read or the file system does not support them.
 #[derive(Debug)]
 pub(super) struct Flags(Option<IFlags>);
 
 impl Flags {
-    /// Reads the flags of the file.
-    pub(super) fn of(path: &Path) -> Self {
+    /// Reads the flags of a file.
+    pub(super) fn read(path: &Path) -> Self {
         Self(File::open(path).ok().and_then(|file| ioctl_getflags(file).ok()))
     }
 
-    /// Gives the flags to a new, empty file; returns whether it has them.
+    /// Applies the flags to a new, empty file. Returns whether it has them now.
     pub(super) fn carry_over(&self, new: &File) -> bool {
         let Some(wanted) = self.0 else { return true };
         let set = || {
             let now = ioctl_getflags(new)?;
-            let then = (now - CARRIED) | (wanted & CARRIED);
-            // Flags that are already set need no right to be set.
+            let then = (now - USER_FLAGS) | (wanted & USER_FLAGS);
+            // Skip the call if nothing changes, because it needs permission.
             if now == then { Ok(()) } else { ioctl_setflags(new, then) }
         };
         set().is_ok()
@@ -45,22 +45,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flags_stay_and_those_of_the_folder_do_not_take_their_place() {
+    fn flags_are_kept_despite_those_of_the_folder() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        let flags = |path: &Path| ioctl_getflags(File::open(path).expect("it is there"));
+        let flags = |path: &Path| ioctl_getflags(File::open(path).expect("a file"));
         let set = |path: &Path, to: IFlags| {
             let now = flags(path)?;
-            ioctl_setflags(File::open(path).expect("it is there"), (now - CARRIED) | to)
+            ioctl_setflags(File::open(path).expect("a file"), (now - USER_FLAGS) | to)
         };
         for flag in [IFlags::NODUMP, IFlags::NODUMP | IFlags::NOATIME, IFlags::empty()] {
             std::fs::write(&path, "old").expect("written");
             if let Err(error) = set(&path, flag).and_then(|()| set(folder.path(), IFlags::NODUMP)) {
-                return eprintln!("skipped: no flags can be had here: {error}");
+                return eprintln!("skipped: flags are not supported here: {error}");
             }
             write::atomic(&path, b"new").expect("written");
             assert_eq!(std::fs::read(&path).expect("read"), b"new");
-            assert_eq!(flags(&path).expect("flags") & CARRIED, flag);
+            assert_eq!(flags(&path).expect("flags") & USER_FLAGS, flag);
         }
     }
 }

@@ -1,24 +1,24 @@
-//! File formats and what they can hold.
+//! Image and animation file formats and their limits.
 
 use std::fmt;
 use std::path::Path;
 
 use super::OutputError;
 
-/// A file format of pictures.
+/// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Format {
-    /// 8 or 16 bit sRGB.
+    /// 8-bit or 16-bit sRGB.
     Png,
-    /// 32 bit float, linear.
+    /// 32-bit float, linear.
     Exr,
     /// Radiance RGBE, linear.
     Hdr,
-    /// 8 bit sRGB, lossy.
+    /// 8-bit sRGB, lossy.
     Jpeg,
-    /// 8 or 16 bit sRGB, binary.
+    /// 8-bit or 16-bit sRGB, binary.
     Ppm,
-    /// 8 bit sRGB, without loss.
+    /// 8-bit sRGB, lossless.
     WebP,
 }
 
@@ -45,8 +45,8 @@ impl TryFrom<u8> for BitDepth {
 }
 
 impl Format {
-    /// Endings, without the dot, and their formats.
-    const ENDINGS: [(&'static str, Self); 7] = [
+    /// Extensions (without the dot) and their formats.
+    const EXTENSIONS: [(&'static str, Self); 7] = [
         ("png", Self::Png),
         ("exr", Self::Exr),
         ("hdr", Self::Hdr),
@@ -56,49 +56,49 @@ impl Format {
         ("webp", Self::WebP),
     ];
 
-    /// All known endings, without the dot.
-    pub fn endings() -> impl Iterator<Item = &'static str> {
-        Self::ENDINGS.iter().map(|(ending, _)| *ending)
+    /// All known extensions, without the dot.
+    pub fn extensions() -> impl Iterator<Item = &'static str> {
+        Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 
-    /// The known endings, as a message lists them.
-    pub(super) fn known_endings() -> String {
-        Self::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ")
+    /// List of the known extensions for messages.
+    pub(super) fn known_extensions() -> String {
+        Self::EXTENSIONS.map(|(extension, _)| format!(".{extension}")).join(", ")
     }
 
-    /// The format of a path's ending, in small letters or capitals.
+    /// Returns the format for a path's extension, ignoring case.
     ///
     /// # Errors
-    /// There is no ending, or no format has it.
-    pub fn of(path: &Path) -> Result<Self, OutputError> {
-        let Some(ending) = path.extension() else {
-            return Err(OutputError::NoEnding { path: path.to_owned() });
+    /// The path has no extension, or an unknown one.
+    pub fn from_path(path: &Path) -> Result<Self, OutputError> {
+        let Some(extension) = path.extension() else {
+            return Err(OutputError::NoExtension { path: path.to_owned() });
         };
-        let ending = ending.to_string_lossy().to_lowercase();
-        let known = Self::ENDINGS.iter().find(|(known, _)| *known == ending).map(|&(_, format)| format);
-        known.ok_or_else(|| OutputError::UnknownEnding { path: path.to_owned(), ending })
+        let extension = extension.to_string_lossy().to_lowercase();
+        let known = Self::EXTENSIONS.iter().find(|(known, _)| *known == extension).map(|&(_, format)| format);
+        known.ok_or_else(|| OutputError::UnknownExtension { path: path.to_owned(), extension })
     }
 
-    /// Checks that a file of this format can hold such a picture.
+    /// Checks that this format can represent an image of this size and bit depth.
     ///
     /// # Errors
     /// [`OutputError::Unsuitable`] with the reason.
-    pub fn check_picture(self, width: u32, height: u32, bit_depth: BitDepth) -> Result<(), OutputError> {
+    pub fn check_image(self, width: u32, height: u32, bit_depth: BitDepth) -> Result<(), OutputError> {
         let unsuitable = |why: String| Err(OutputError::Unsuitable { format: self, why });
         if width == 0 || height == 0 {
-            return unsuitable(format!("hold a picture without pixels ({width}×{height})"));
+            return unsuitable(format!("hold an image without pixels ({width}×{height})"));
         }
-        let most = match self {
+        let limit = match self {
             Self::Png | Self::Exr | Self::Hdr | Self::Ppm => return Ok(()),
             Self::Jpeg => 65535,
             Self::WebP => 16383,
         };
-        if width > most || height > most {
-            return unsuitable(format!("hold {width}×{height} pixels, at most {most}×{most}"));
+        if width > limit || height > limit {
+            return unsuitable(format!("hold {width}×{height} pixels (maximum {limit}×{limit})"));
         }
         match bit_depth {
             BitDepth::Eight => Ok(()),
-            BitDepth::Sixteen => unsuitable("hold 16 bits a channel".to_owned()),
+            BitDepth::Sixteen => unsuitable("hold 16 bits per channel".to_owned()),
         }
     }
 }
@@ -116,47 +116,47 @@ impl fmt::Display for Format {
     }
 }
 
-/// A file format of moving pictures.
+/// Format of an animation file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MovingFormat {
-    /// 256 colours, the same for all frames.
+pub enum AnimationFormat {
+    /// 256 colors, the same for all frames.
     Gif,
-    /// 8 bit sRGB, without loss.
+    /// 8-bit sRGB, lossless.
     Apng,
 }
 
-impl MovingFormat {
-    const ENDINGS: [(&'static str, Self); 2] = [("gif", Self::Gif), ("apng", Self::Apng)];
+impl AnimationFormat {
+    const EXTENSIONS: [(&'static str, Self); 2] = [("gif", Self::Gif), ("apng", Self::Apng)];
 
-    /// All known endings, without the dot.
-    pub fn endings() -> impl Iterator<Item = &'static str> {
-        Self::ENDINGS.iter().map(|(ending, _)| *ending)
+    /// All known extensions, without the dot.
+    pub fn extensions() -> impl Iterator<Item = &'static str> {
+        Self::EXTENSIONS.iter().map(|(extension, _)| *extension)
     }
 
-    /// The format of a path's ending, in small letters or capitals. `None` if it is not one of moving pictures.
-    pub fn of(path: &Path) -> Option<Self> {
-        let ending = path.extension()?;
-        let known = Self::ENDINGS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known));
+    /// Returns the format for a path's extension, ignoring case. `None` for other extensions.
+    pub fn from_path(path: &Path) -> Option<Self> {
+        let extension = path.extension()?;
+        let known = Self::EXTENSIONS.iter().find(|(known, _)| extension.eq_ignore_ascii_case(known));
         known.map(|&(_, format)| format)
     }
 
-    /// Checks that a file of this format can hold frames of this size.
+    /// Checks that this format can represent frames of this size.
     ///
     /// # Errors
-    /// [`OutputError::Moving`] with the reason.
+    /// [`OutputError::Animation`] with the reason.
     pub fn check_size(self, width: u32, height: u32) -> Result<(), OutputError> {
-        const MOST: u32 = u16::MAX as u32;
+        const LIMIT: u32 = u16::MAX as u32;
         match self {
-            Self::Gif if width > MOST || height > MOST => Err(OutputError::Moving {
+            Self::Gif if width > LIMIT || height > LIMIT => Err(OutputError::Animation {
                 format: self,
-                why: format!("cannot hold {width}×{height} pixels, at most {MOST}×{MOST}; use .apng"),
+                why: format!("cannot hold {width}×{height} pixels (maximum {LIMIT}×{LIMIT}); use .apng"),
             }),
             Self::Gif | Self::Apng => Ok(()),
         }
     }
 }
 
-impl fmt::Display for MovingFormat {
+impl fmt::Display for AnimationFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Gif => "GIF",

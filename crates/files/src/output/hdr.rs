@@ -1,16 +1,16 @@
-//! Radiance HDR: G. Ward, "Real Pixels" (Graphics Gems II, 1991): three mantissas and a shared exponent, lines
-//! compressed by runs. The format has no negative values.
+//! Radiance HDR (G. Ward, *Real Pixels*, Graphics Gems II, 1991): three mantissas and a shared exponent per
+//! pixel, with run-length encoded scanlines. Negative values become 0.
 
 use super::{EncodeOptions, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// Widths whose lines may be compressed; readers take others as plain pixels.
+/// Widths of scanlines that may be compressed. Readers interpret other widths as plain pixels.
 const COMPRESSED_WIDTHS: std::ops::Range<usize> = 8..32768;
 const LONGEST_RUN: usize = 127;
 const LONGEST_LITERAL: usize = 128;
-/// Shorter runs cost as much as literals.
+/// Minimum length of a run. Shorter runs take as much space as literals.
 const SHORTEST_RUN: usize = 4;
 
 pub(super) fn encode(
@@ -44,16 +44,16 @@ fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
     }
 }
 
-/// Rounds the mantissas to the nearest, so that values read back are as often brighter as darker.
+/// Encodes a color, rounding mantissas to nearest so that decoded values are unbiased.
 fn rgbe(color: Vec3) -> [u8; 4] {
     let color = color.to_array().map(|component| f64::from(as_finite(component).max(0.0)));
     let brightest = color[0].max(color[1]).max(color[2]);
-    // 2^(exponent − 1) ≤ brightest < 2^exponent, one more if the mantissa would be rounded up to 256.
+    // 2^(exponent − 1) ≤ brightest < 2^exponent, plus one if the mantissa would round up to 256.
     let mut exponent = libm::log2(brightest).floor() + 1.0;
     if (brightest / libm::exp2(exponent) * 256.0).round() >= 256.0 {
         exponent += 1.0;
     }
-    // The exponent byte is 1 … 255; a zero stands for black.
+    // The exponent byte is 1 … 255; 0 means black.
     if brightest == 0.0 || exponent < -127.0 {
         return [0; 4];
     }
@@ -62,7 +62,7 @@ fn rgbe(color: Vec3) -> [u8; 4] {
     [mantissa(color[0]), mantissa(color[1]), mantissa(color[2]), (exponent as i32 + 128) as u8]
 }
 
-/// Runs as (128 + length, byte), everything else as (length, bytes).
+/// Encodes runs as (128 + length, byte) and other bytes as (length, bytes).
 fn compress(mut plane: &[u8], bytes: &mut Vec<u8>) {
     let run_length = |plane: &[u8]| {
         let same = plane.iter().take_while(|&&byte| byte == plane[0]).count();

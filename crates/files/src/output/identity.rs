@@ -1,4 +1,4 @@
-//! Identity of the file that a path leads to, whatever its name.
+//! Identity of the file that a path refers to.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -6,33 +6,33 @@ use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use super::place::{directory_of, follow};
+use super::resolve_path::{directory_of, follow};
 
-/// Identity of a regular file, existing or not: two paths with the same identity lead to the same file. It resolves
-/// links of both kinds, `..`, and file systems that do not distinguish small letters from capitals.
+/// Identity of a regular file, existing or not. Two paths with the same identity refer to the same file: it
+/// resolves symbolic and hard links, `..`, and case-insensitive file systems.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum FileIdentity {
-    /// A file that exists.
+    /// An existing file.
     Existing {
         /// Device of its file system.
         device: u64,
-        /// Its inode there.
+        /// Inode number.
         inode: u64,
     },
-    /// A file that does not exist yet, in a folder that does.
+    /// A file that does not exist yet, in an existing folder.
     New {
         /// Device of the folder's file system.
         device: u64,
-        /// The folder's inode there.
+        /// Inode number of the folder.
         inode: u64,
-        /// Its name in that folder.
+        /// File name in the folder.
         name: OsString,
     },
 }
 
 impl FileIdentity {
-    /// The identity of the path's file. `None` if a write would replace nothing: folders, devices, pipes, and paths
-    /// that cannot be followed.
+    /// Returns the identity of a path's file. `None` for paths where a write replaces no file: folders,
+    /// devices, pipes, and unresolvable paths.
     pub fn of(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(found) if found.is_file() => Some(Self::Existing { device: found.dev(), inode: found.ino() }),
@@ -41,7 +41,7 @@ impl FileIdentity {
         }
     }
 
-    /// Whether it is the identity of an open file.
+    /// Whether this is the identity of an open file.
     pub fn is_of(&self, file: &File) -> bool {
         let found = |found: fs::Metadata| Self::Existing { device: found.dev(), inode: found.ino() };
         file.metadata().is_ok_and(|metadata| found(metadata) == *self)
@@ -55,21 +55,21 @@ impl FileIdentity {
     }
 }
 
-/// Properties of an existing file by which it is known where its identity is not enough: some file systems that ignore case have no
-/// stable inodes, such as FAT and some network mounts.
+/// Properties that identify an existing file where [`FileIdentity`] is not sufficient: some case-insensitive
+/// file systems have no stable inode numbers, such as FAT and some network file systems.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Likeness {
+pub struct FileFingerprint {
     real: PathBuf,
-    /// The folder in lower case.
+    /// Folder in lower case.
     folder: PathBuf,
-    /// The name in lower case.
+    /// Name in lower case.
     name: OsString,
     length: u64,
     modified: (i64, i64),
 }
 
-impl Likeness {
-    /// The likeness of the path's file. `None` if it is not an existing regular file.
+impl FileFingerprint {
+    /// Returns the fingerprint of a path's file. `None` unless it is an existing regular file.
     pub fn of(path: &Path) -> Option<Self> {
         let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         let real = path.canonicalize().ok()?;
@@ -83,29 +83,30 @@ impl Likeness {
         })
     }
 
-    /// Whether both have to be taken for one file: they are in one folder, and their names differ in case at most, or they have the same
-    /// length, time and content.
-    pub fn is_like(&self, other: &Self) -> bool {
+    /// Whether both may be the same file: they are in the same folder, and either their names differ at most
+    /// in case, or they have the same length, modification time and content.
+    pub fn may_equal(&self, other: &Self) -> bool {
         let is_stamp_same = || (self.length, self.modified) == (other.length, other.modified);
         self.folder == other.folder
-            && (self.name == other.name || is_stamp_same() && have_one_content(&self.real, &other.real))
+            && (self.name == other.name || is_stamp_same() && have_same_content(&self.real, &other.real))
     }
 }
 
-fn have_one_content(one: &Path, other: &Path) -> bool {
+fn have_same_content(a: &Path, b: &Path) -> bool {
     let hash = |path: &Path| {
         let mut hasher = blake3::Hasher::new();
         hasher.update_reader(File::open(path).ok()?).ok()?;
         Some(hasher.finalize())
     };
-    hash(one).is_some_and(|hash_of_one| Some(hash_of_one) == hash(other))
+    hash(a).is_some_and(|hash_of_a| Some(hash_of_a) == hash(b))
 }
 
-/// Whether two paths lead to one file, existing or not, or to files that have to be taken for one ([`Likeness`]).
-pub fn is_one_file(one: &Path, other: &Path) -> bool {
-    let Some(identity) = FileIdentity::of(one) else { return false };
-    let are_alike = || Some(Likeness::of(one)?.is_like(&Likeness::of(other)?));
-    FileIdentity::of(other) == Some(identity) || are_alike().unwrap_or(false)
+/// Whether two paths refer to the same file, existing or not, or may do so according to their
+/// [`FileFingerprint`].
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    let Some(identity) = FileIdentity::of(a) else { return false };
+    let are_alike = || Some(FileFingerprint::of(a)?.may_equal(&FileFingerprint::of(b)?));
+    FileIdentity::of(b) == Some(identity) || are_alike().unwrap_or(false)
 }
 
 #[cfg(test)]
@@ -115,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_file_has_one_identity_by_all_its_names() {
+    fn all_paths_of_a_file_have_the_same_identity() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir_all(at("far/away")).expect("folders");
@@ -128,12 +129,12 @@ mod tests {
         for name in ["./a", "far/../a", "link", "hard", "far/away/../../a"] {
             assert_eq!(of(name), of("a"), "{name}");
         }
-        assert_eq!(of("near/../b"), of("far/b"), "`..` is the folder above that which the link leads to");
+        assert_eq!(of("near/../b"), of("far/b"), "`..` applies to the link's target");
         assert_ne!(of("far/b"), of("a"));
     }
 
     #[test]
-    fn a_file_that_is_not_there_yet_has_one_too() {
+    fn files_that_do_not_exist_have_an_identity() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir_all(at("far/away")).expect("folders");
@@ -151,11 +152,11 @@ mod tests {
     }
 
     #[test]
-    fn files_that_may_be_one_are_taken_for_one() {
+    fn possibly_identical_files_count_as_the_same() {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("other")).expect("a folder");
-        // A file system that distinguishes case stands for one whose inodes do not tell.
+        // Simulate a file system without stable inode numbers.
         let files =
             [("t.png", "one"), ("T.PNG", "longer"), ("a.png", "one"), ("b.png", "two"), ("c.png", "one")];
         for (name, text) in files.into_iter().chain([("other/t.png", "one")]) {
@@ -176,14 +177,14 @@ mod tests {
             ("other/t.png", false),
             ("none", false),
         ] {
-            assert_eq!(is_one_file(&at(name), &at("t.png")), is_one, "{name}");
+            assert_eq!(is_same_file(&at(name), &at("t.png")), is_one, "{name}");
         }
-        assert!(!is_one_file(folder.path(), folder.path()), "a folder is not a file");
-        assert!(is_one_file(&at("none"), &at("other/../none")), "one that does not exist yet");
+        assert!(!is_same_file(folder.path(), folder.path()), "folders are not files");
+        assert!(is_same_file(&at("none"), &at("other/../none")), "a file that does not exist yet");
     }
 
     #[test]
-    fn what_is_not_replaced_has_none() {
+    fn special_files_have_no_identity() {
         let folder = tempfile::tempdir().expect("a folder");
         let circle = folder.path().join("circle");
         symlink("circle", &circle).expect("a link");

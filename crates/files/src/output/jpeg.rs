@@ -1,14 +1,14 @@
-//! JPEG: 8 bit sRGB, every component at full resolution.
+//! JPEG: 8-bit sRGB without chroma subsampling.
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 
-use super::stoppable::{self, Stoppable};
+use super::cancellable::{self, CancellableBuffer};
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Quality, of 100: no visible loss at arm's length, at a quarter of the size of 100.
+/// Quality (maximum 100): visually lossless at arm's length, at a quarter of the size of quality 100.
 const QUALITY: u8 = 92;
 
 pub(super) fn encode(
@@ -16,15 +16,15 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let picture = stoppable::developed_whole(image, (options, Format::Jpeg), token)?;
-    let mut bytes = Stoppable::new(token);
+    let pixels = cancellable::develop_all(image, (options, Format::Jpeg), token)?;
+    let mut bytes = CancellableBuffer::new(token);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
-        .encode(&picture, image.width, image.height, ExtendedColorType::Rgb8)
+        .encode(&pixels, image.width, image.height, ExtendedColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;
     Ok(with_comment(&bytes.into_bytes(), &comment(options)))
 }
 
-/// The settings, a line each.
+/// Metadata, one line per item.
 fn comment(options: &EncodeOptions) -> String {
     let mut comment = format!("Software: {SOFTWARE}\n");
     for (name, value) in &options.metadata {
@@ -33,15 +33,15 @@ fn comment(options: &EncodeOptions) -> String {
     comment
 }
 
-/// The file with a comment behind its first two bytes and the segment that must follow them (ITU-T T.81, B.2.4.5): the encoder
-/// writes none.
+/// Inserts a comment after the first two bytes and the segment that must follow them (ITU-T T.81, B.2.4.5).
+/// The encoder does not write comments.
 fn with_comment(file: &[u8], comment: &str) -> Vec<u8> {
     const COMMENT: [u8; 2] = [0xff, 0xfe];
-    /// Most bytes of a segment's content.
-    const MOST: usize = u16::MAX as usize - 2;
+    /// Maximum size of a segment's content.
+    const MAX_BYTES: usize = u16::MAX as usize - 2;
     let length = file.get(4..6).map_or(0, |two| usize::from(u16::from_be_bytes([two[0], two[1]])));
     let (head, rest) = file.split_at((4 + length).min(file.len()));
-    let comment = &comment.as_bytes()[..comment.len().min(MOST)];
+    let comment = &comment.as_bytes()[..comment.len().min(MAX_BYTES)];
     let length = (comment.len() as u16 + 2).to_be_bytes();
     [head, &COMMENT, &length, comment, rest].concat()
 }

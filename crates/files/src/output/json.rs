@@ -1,4 +1,4 @@
-//! JSON that is safe on a terminal: characters that it would act on, or not show, are escaped as `\u200d`.
+//! JSON that is safe to print on a terminal: control and invisible characters are escaped like `\u200d`.
 
 use std::fmt::Write;
 
@@ -6,32 +6,32 @@ use serde::Serialize;
 
 use crate::system::text::is_plain;
 
-/// A value in one line, without a line end.
+/// Formats a value on a single line, without a line feed.
 ///
 /// # Errors
-/// The errors of the value's own serialisation.
-pub fn in_a_line(value: &impl Serialize) -> serde_json::Result<String> {
-    serde_json::to_string(value).map(harmless)
+/// Serialization errors of the value.
+pub fn to_line(value: &impl Serialize) -> serde_json::Result<String> {
+    serde_json::to_string(value).map(escape_unsafe)
 }
 
-/// A value as the text of a file: indented, with a line end.
+/// Formats a value as a file's contents: indented, with a final line feed.
 ///
 /// # Errors
-/// The errors of the value's own serialisation.
+/// Serialization errors of the value.
 pub fn file(value: &impl Serialize) -> serde_json::Result<String> {
-    serde_json::to_string_pretty(value).map(|text| harmless(text) + "\n")
+    serde_json::to_string_pretty(value).map(|text| escape_unsafe(text) + "\n")
 }
 
-/// Escapes such characters. Line ends come from the layout, as they are escaped within strings; every other such
-/// character is within a string.
-fn harmless(text: String) -> String {
-    let is_harmless = |c: char| c == '\n' || is_plain(c);
-    if text.chars().all(is_harmless) {
+/// Escapes unsafe characters. Line feeds are only used between tokens; all other unsafe characters are inside
+/// strings.
+fn escape_unsafe(text: String) -> String {
+    let is_safe = |c: char| c == '\n' || is_plain(c);
+    if text.chars().all(is_safe) {
         return text;
     }
     let mut escaped = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        if is_harmless(c) {
+        if is_safe(c) {
             escaped.push(c);
         } else {
             for unit in c.encode_utf16(&mut [0; 2]) {
@@ -48,9 +48,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_terminal_acts_on_is_escaped_and_comes_back() {
+    fn unsafe_characters_are_escaped_reversibly() {
         let odd = "a\u{9b}\u{7f}\u{202e}\u{200d}\u{e0041}\u{1b}\n\t\"\\ä木🌳";
-        let text = in_a_line(&[odd]).expect("JSON");
+        let text = to_line(&[odd]).expect("JSON");
         assert_eq!(text, "[\"a\\u009b\\u007f\\u202e\\u200d\\udb40\\udc41\\u001b\\n\\t\\\"\\\\ä木🌳\"]");
         assert_eq!(serde_json::from_str::<[String; 1]>(&text).expect("JSON"), [odd]);
         let laid_out = file(&[odd]).expect("JSON");

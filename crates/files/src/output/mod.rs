@@ -1,12 +1,15 @@
-//! Pictures to bytes, bytes to files.
+//! Encodes images and writes files.
 //!
-//! [`check_target`] before hours of work, [`encode`] into memory, [`write::atomic`] to disk: a file is whole, or it is
-//! the old one. [`FileIdentity`] decides whether two paths lead to one file.
+//! [`check_target`] runs before rendering, [`encode`] encodes in memory, and [`write::atomic`] writes to
+//! disk: a file is either complete or unchanged. [`FileIdentity`] decides whether two paths refer to the same
+//! file.
 
+pub mod animation;
 mod attributes;
+mod cancellable;
+mod develop;
 mod error;
 mod exr;
-mod finish;
 #[cfg(target_os = "linux")]
 mod flags;
 mod format;
@@ -16,17 +19,15 @@ mod identity;
 mod jpeg;
 pub mod json;
 mod move_new;
-pub mod moving;
 mod origin;
 pub mod part;
-mod place;
 mod png;
 mod ppm;
 mod protection;
+mod resolve_path;
 pub mod scene_path;
 pub mod settings;
 pub mod staged;
-mod stoppable;
 mod temporary;
 mod webp;
 pub mod write;
@@ -34,53 +35,53 @@ pub mod write;
 use std::path::Path;
 
 pub use attributes::Losses;
+pub use develop::DevelopSettings;
 pub use error::OutputError;
 pub use exr::mean_luminance_error;
-pub use finish::Finish;
-pub use format::{BitDepth, Format, MovingFormat};
-pub use identity::{FileIdentity, Likeness, is_one_file};
+pub use format::{AnimationFormat, BitDepth, Format};
+pub use identity::{FileFingerprint, FileIdentity, is_same_file};
 pub use origin::{
-    Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, scene_of_picture, signed,
+    Replaced, replaced_image, replaced_json, replaced_plot, replaced_table, scene_of_image, signed,
 };
 
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::tone::ToneMapping;
 
-/// Name and version of the program, as written into files.
+/// Program name and version, as written to files.
 const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
-/// Name of the program, the first word of that.
+/// Program name.
 const PROGRAM: &str = "glimt";
 
-/// Numbers about the pixels of a picture, in channels of their own.
+/// An additional layer (AOV) of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerImage {
     /// Name of the layer.
     pub name: &'static str,
-    /// Names of its channels, at most three: as many components of the pixels are written.
+    /// Names of its channels, at most three. Determines how many components of the pixels are written.
     pub channels: &'static [&'static str],
-    /// The numbers, as many as the picture has pixels.
+    /// Pixel values. Has the size of the image.
     pub image: RadianceImage,
 }
 
-/// Settings for encoding a picture.
+/// Settings for encoding an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncodeOptions {
-    /// Tone mapping for files of 8 and 16 bits; float files get linear radiance, unexposed.
+    /// Tone mapping for 8-bit and 16-bit formats. Float formats store linear radiance without exposure.
     pub tone: ToneMapping,
-    /// Bit depth of PNG and PPM; float files always have 32 bits.
+    /// Bit depth of PNG and PPM. Float formats always use 32 bits.
     pub bit_depth: BitDepth,
-    /// Names and values (the scene, the settings), written into PNG text chunks and the comments of EXR, HDR and
-    /// PPM files. The program and its version are always written.
+    /// Metadata names and values (the scene, the settings), written to PNG text chunks and to comments of
+    /// EXR, HDR and PPM files. The program version is always written.
     pub metadata: Vec<(String, String)>,
-    /// Standard error of the picture's mean luminance, an attribute of EXR files. `None` if it is not known.
+    /// Standard error of the mean luminance, an attribute of EXR files. `None` if unknown.
     pub mean_luminance_error: Option<f64>,
 }
 
-/// The bytes of a file of this format. The same picture and options give the same bytes.
+/// Encodes an image. The same image and options always give the same bytes.
 ///
 /// # Errors
-/// A format that cannot hold a picture of this size or depth; an encoder that fails; [`OutputError::Cancelled`].
+/// The format does not support this size or bit depth; the encoder fails; [`OutputError::Cancelled`].
 pub fn encode(
     image: &RadianceImage,
     options: &EncodeOptions,
@@ -90,20 +91,21 @@ pub fn encode(
     encode_with((image, &[]), options, format, token)
 }
 
-/// [`encode`] with layers, which only EXR files hold.
+/// [`encode`] with layers, which only EXR files support.
 pub(crate) fn encode_with(
     (image, layers): (&RadianceImage, &[LayerImage]),
     options: &EncodeOptions,
     format: Format,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    format.check_picture(image.width, image.height, options.bit_depth)?;
-    let is_whole = |image: &RadianceImage| image.pixels.len() == image.width as usize * image.height as usize;
+    format.check_image(image.width, image.height, options.bit_depth)?;
+    let is_complete =
+        |image: &RadianceImage| image.pixels.len() == image.width as usize * image.height as usize;
     let fits = |layer: &LayerImage| {
-        (layer.image.width, layer.image.height) == (image.width, image.height) && is_whole(&layer.image)
+        (layer.image.width, layer.image.height) == (image.width, image.height) && is_complete(&layer.image)
     };
-    if !is_whole(image) || !layers.iter().all(fits) {
-        return Err(OutputError::encoder(format, &"the picture's size and its pixels do not agree"));
+    if !is_complete(image) || !layers.iter().all(fits) {
+        return Err(OutputError::encoder(format, &"the image size does not match the number of pixels"));
     }
     let bytes = match format {
         Format::Png => png::encode(image, options, token),
@@ -113,54 +115,56 @@ pub(crate) fn encode_with(
         Format::Ppm => ppm::encode(image, options, token),
         Format::WebP => webp::encode(image, options, token),
     };
-    // An encoder that was stopped reports an error of its writer.
+    // A cancelled encoder reports an error of its writer.
     token.check()?;
     bytes
 }
 
-/// Checks that a picture can be written to this path, as far as this is possible before the work. Leaves nothing behind.
-/// Returns the format of the ending.
+/// Checks that an image can be written to this path, as far as possible before rendering. Leaves no files
+/// behind. Returns the format for the extension.
 ///
 /// # Errors
-/// No format has the ending; the directory is missing or takes no files; the target is a directory or may not be written.
+/// Unknown extension; the directory does not exist or files cannot be created there; the target is a
+/// directory or not writable.
 pub fn check_target(path: &Path) -> Result<Format, OutputError> {
-    let format = Format::of(path)?;
-    place::check(path)?;
+    let format = Format::from_path(path)?;
+    resolve_path::check(path)?;
     Ok(format)
 }
 
-/// [`check_target`] without a trial in the directory, for frequent checks.
+/// [`check_target`] without creating a file, for frequent checks.
 ///
 /// # Errors
-/// As [`check_target`], but not for a directory that takes no files although it may be written.
-pub fn look_at_target(path: &Path) -> Result<Format, OutputError> {
-    let format = Format::of(path)?;
-    look_at_place(path)?;
+/// Same as [`check_target`], except for directories in which files cannot be created despite their
+/// permissions.
+pub fn inspect_target(path: &Path) -> Result<Format, OutputError> {
+    let format = Format::from_path(path)?;
+    inspect_path(path)?;
     Ok(format)
 }
 
-/// [`look_at_target`] for any file.
+/// [`inspect_target`] for any kind of file.
 ///
 /// # Errors
-/// As [`look_at_target`], but not for the ending.
-pub fn look_at_place(path: &Path) -> Result<(), OutputError> {
-    place::find(path).map(drop)
+/// Same as [`inspect_target`], except for the extension.
+pub fn inspect_path(path: &Path) -> Result<(), OutputError> {
+    resolve_path::find(path).map(drop)
 }
 
-/// Checks that any file can be written to this path, as far as this is possible before the work.
+/// Checks that a file of any kind can be written to this path, as far as possible before the work.
 ///
 /// # Errors
-/// As [`check_target`], but not for the ending.
-pub fn check_place(path: &Path) -> Result<(), OutputError> {
-    place::check(path)
+/// Same as [`check_target`], except for the extension.
+pub fn check_path(path: &Path) -> Result<(), OutputError> {
+    resolve_path::check(path)
 }
 
-/// A component as a finite number, for files without infinity.
+/// Replaces NaN by 0 and infinities by the largest finite value.
 fn as_finite(component: f32) -> f32 {
     if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }
 
-/// A name or value as a line of a text header can hold it.
+/// Replaces control characters, for text headers made of lines.
 fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

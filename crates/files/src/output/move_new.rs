@@ -1,16 +1,16 @@
-//! Moves a file or a folder to a name that nothing has.
+//! Moves files and folders without overwriting.
 
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
-/// Moves a file or a folder to a place where nothing is.
+/// Moves a file or a folder. Fails if the destination exists.
 #[cfg(any(target_os = "linux", target_vendor = "apple"))]
 pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     use rustix::io::Errno;
     match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
-        // The file system, or the kernel, does not know it.
+        // The file system or the kernel does not support the flag.
         Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => move_by_steps(from, to),
         moved => moved.map_err(io::Error::from),
     }
@@ -21,10 +21,10 @@ pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
     move_by_steps(from, to)
 }
 
-/// [`move_new`] by calls that fail where something is.
+/// [`move_new`] with two calls, of which the first fails if the destination exists.
 fn move_by_steps(from: &Path, to: &Path) -> io::Result<()> {
     if from.is_dir() {
-        // A folder may take the place of this one only, which is empty.
+        // The rename can only replace the empty folder created here.
         fs::create_dir(to)?;
         fs::rename(from, to)
     } else {
@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_replace_nothing() {
+    fn moves_in_two_steps_overwrite_nothing() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = |name: &str| directory.path().join(name);
         fs::create_dir_all(at("from/in")).expect("a folder");

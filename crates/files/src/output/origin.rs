@@ -1,5 +1,5 @@
-//! Whether glimt wrote the file that a write would replace: its content decides, whatever its ending. A kind of file
-//! replaces its own kind alone.
+//! Detects from its content whether glimt wrote an existing file, so that glimt only replaces its own files,
+//! and only by the same kind of file.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
@@ -8,20 +8,20 @@ use std::path::Path;
 use memchr::memmem;
 use serde::de::DeserializeOwned;
 
-use super::place::{self, Place, Target};
+use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::{PROGRAM, SOFTWARE};
 
-/// Bytes of the chunks before a picture's pixels; those of glimt take some hundred.
+/// Limit on the size of PNG chunks before the pixels. glimt writes a few hundred bytes.
 const HEADER_BYTES: usize = 1 << 20;
-/// Largest plot that is examined, in bytes.
+/// Maximum size of a plot that is examined.
 const PLOT_BYTES: u64 = 64 << 20;
 
-/// File that a write would replace.
+/// The file that a write would replace.
 #[derive(Debug)]
 pub enum Replaced {
     /// No file, or one that may be replaced.
     Own,
-    /// A file that somebody else may want to keep, and the kind that glimt would write there: "a report".
+    /// A file of another origin, with the kind that glimt would write: "a report".
     Foreign(&'static str),
     /// A file that cannot be read.
     Unreadable(io::Error),
@@ -42,32 +42,31 @@ impl Replaced {
         }
     }
 
-    /// [`Self::of`] for texts: an empty file may be replaced too.
+    /// [`Self::of`] for text files, where an empty file may also be replaced.
     fn of_text(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
         Self::of(replaced(path), kind, |file| is_empty(&file) || is_own(file))
     }
 
-    /// Why the file is not replaced; `None` if it may be.
-    pub fn why_kept(&self) -> Option<String> {
+    /// Reason not to replace the file. `None` if it may be replaced.
+    pub fn reason_to_keep(&self) -> Option<String> {
         match self {
             Self::Own => None,
-            Self::Foreign(kind) => Some(format!("the file of this name is not {kind} that glimt wrote")),
-            Self::Unreadable(error) => Some(format!(
-                "the file of this name cannot be read: {}",
-                crate::system::describe_error(error)
-            )),
+            Self::Foreign(kind) => Some(format!("the existing file is not {kind} that glimt wrote")),
+            Self::Unreadable(error) => {
+                Some(format!("the existing file cannot be read: {}", crate::system::describe_error(error)))
+            }
         }
     }
 }
 
-/// Whether a picture may be replaced: a PNG whose text chunk names glimt.
-pub fn replaced_picture(path: &Path) -> Replaced {
-    Replaced::of(replaced(path), "a picture", is_own_picture)
+/// Checks whether an image may be replaced: a PNG with a text chunk naming glimt.
+pub fn replaced_image(path: &Path) -> Replaced {
+    Replaced::of(replaced(path), "an image", is_own_image)
 }
 
-/// The scene that a PNG of glimt names. `None` for a file that does not exist and for a picture that names none.
-pub fn scene_of_picture(path: &Path) -> Option<String> {
+/// Scene named by a PNG file written by glimt. `None` if the file does not exist or names no scene.
+pub fn scene_of_image(path: &Path) -> Option<String> {
     const KEY: &str = "glimt:scene";
     let reader = png_header(replaced(path)?.ok()?)?;
     let info = reader.info();
@@ -76,7 +75,7 @@ pub fn scene_of_picture(path: &Path) -> Option<String> {
     latin.map(|text| text.text.clone()).or_else(utf8)
 }
 
-/// Whether a file of JSON may be replaced: one that is `T` as a whole and passes the test, or an empty file.
+/// Checks whether a JSON file may be replaced: one that parses as `T` and passes the test, or an empty file.
 pub fn replaced_json<T: DeserializeOwned>(
     path: &Path,
     kind: &'static str,
@@ -84,13 +83,14 @@ pub fn replaced_json<T: DeserializeOwned>(
 ) -> Replaced {
     Replaced::of_text(path, kind, |file| {
         let mut reader = BufReader::new(file);
-        // Do not read large files of others to their end for nothing.
+        // Do not read large files of another format completely.
         let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
         is_object && serde_json::from_reader(reader).is_ok_and(|value| is_own(&value))
     })
 }
 
-/// Whether a table may be replaced: one with this first line, given with its end, or an empty file.
+/// Checks whether a table may be replaced: one that starts with this line, including its line end, or an
+/// empty file.
 pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
     Replaced::of_text(path, "a table", |file| {
         let mut start = Vec::new();
@@ -99,16 +99,16 @@ pub fn replaced_table(path: &Path, first_line: &str) -> Replaced {
     })
 }
 
-/// Whether a plot may be replaced: one with these texts that is [`signed`] or of a version that did not sign, or an empty
-/// file.
+/// Checks whether a plot may be replaced: one that contains these texts and is [`signed`] or from a version
+/// without signatures, or an empty file.
 pub fn replaced_plot(path: &Path, texts: &[&str]) -> Replaced {
     Replaced::of_text(path, "a plot", |file| is_own_plot(file, texts))
 }
 
-/// The signature's start, which follows an SVG's first tag.
+/// Start of the signature, which follows the first tag of an SVG file.
 const SIGNATURE: &str = "\n<desc>";
 
-/// A plot that says which program drew it.
+/// Adds a signature with the program's name to a plot.
 pub fn signed(svg: &str) -> String {
     match svg.split_once('>') {
         Some((start, rest)) => format!("{start}>{SIGNATURE}{SOFTWARE}</desc>{rest}"),
@@ -116,16 +116,16 @@ pub fn signed(svg: &str) -> String {
     }
 }
 
-/// The regular file that a write would replace, open if it can be read.
+/// Opens the regular file that a write would replace, if there is one.
 fn replaced(path: &Path) -> Option<io::Result<File>> {
-    match place::find(path) {
-        Ok(Place::File(Target { path, existing: Some(_) })) => Some(File::open(path)),
-        // Nothing is replaced there; whoever writes reports what cannot be written.
-        Ok(Place::File(Target { existing: None, .. }) | Place::InPlace(_)) | Err(_) => None,
+    match resolve_path::find(path) {
+        Ok(WriteTarget::File(TargetFile { path, existing: Some(_) })) => Some(File::open(path)),
+        // Nothing would be replaced. Errors are reported when the file is written.
+        Ok(WriteTarget::File(TargetFile { existing: None, .. }) | WriteTarget::InPlace(_)) | Err(_) => None,
     }
 }
 
-/// A PNG up to its first pixel.
+/// Reads a PNG up to its first pixel.
 fn png_header(file: File) -> Option<png::Reader<BufReader<File>>> {
     let limits = png::Limits { bytes: HEADER_BYTES };
     let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), limits);
@@ -133,13 +133,13 @@ fn png_header(file: File) -> Option<png::Reader<BufReader<File>>> {
     decoder.read_info().ok()
 }
 
-fn is_own_picture(file: File) -> bool {
+fn is_own_image(file: File) -> bool {
     let Some(reader) = png_header(file) else { return false };
     let texts = &reader.info().uncompressed_latin1_text;
     texts.iter().any(|text| text.keyword == "Software" && is_program(&text.text))
 }
 
-/// `glimt 0.1.0`
+/// Whether the text is like `glimt 0.1.0`.
 fn is_program(software: &str) -> bool {
     software.split_once(' ').is_some_and(|(name, _)| name == PROGRAM)
 }
@@ -160,28 +160,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_that_cannot_be_read_is_not_called_somebody_else_s() {
+    fn unreadable_files_are_not_called_foreign() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.png");
-        assert!(matches!(replaced_picture(&path), Replaced::Own), "there is none");
-        std::fs::write(&path, "a picture").expect("written");
-        assert!(matches!(replaced_picture(&path), Replaced::Foreign("a picture")));
+        assert!(matches!(replaced_image(&path), Replaced::Own), "no file");
+        std::fs::write(&path, "an image").expect("written");
+        assert!(matches!(replaced_image(&path), Replaced::Foreign("an image")));
         let denied = || Some(Err(io::Error::from(io::ErrorKind::PermissionDenied)));
-        let replaced = Replaced::of(denied(), "a picture", |_| true);
+        let replaced = Replaced::of(denied(), "an image", |_| true);
         assert!(
             matches!(replaced, Replaced::Unreadable(why) if why.kind() == io::ErrorKind::PermissionDenied)
         );
     }
 
     #[test]
-    fn a_file_that_cannot_be_read_is_said_with_the_system_s_reason() {
-        let why = |number| {
-            Replaced::Unreadable(io::Error::from_raw_os_error(number)).why_kept().expect("it is kept")
-        };
-        assert_eq!(why(nix::libc::EACCES), "the file of this name cannot be read: permission denied");
-        assert_eq!(why(nix::libc::EMFILE), "the file of this name cannot be read: too many open files");
-        let foreign = Replaced::Foreign("a report").why_kept();
-        assert_eq!(foreign.as_deref(), Some("the file of this name is not a report that glimt wrote"));
-        assert_eq!(Replaced::Own.why_kept(), None);
+    fn unreadable_files_are_reported_with_the_reason() {
+        for errno in [nix::libc::EACCES, nix::libc::EMFILE] {
+            let error = || io::Error::from_raw_os_error(errno);
+            let reason = Replaced::Unreadable(error()).reason_to_keep().expect("it is kept");
+            assert!(reason.ends_with(&crate::system::describe_error(&error())), "{reason}");
+        }
+        assert!(Replaced::Foreign("a report").reason_to_keep().expect("it is kept").contains("a report"));
+        assert_eq!(Replaced::Own.reason_to_keep(), None);
     }
 }

@@ -1,16 +1,16 @@
-//! PNG: 8 or 16 bit sRGB, with text chunks.
+//! PNG: 8-bit or 16-bit sRGB, with text chunks.
 
 use std::io::Write;
 
 use ::png::{ColorType, Encoder, EncodingError, SrgbRenderingIntent};
 
-use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, stoppable};
+use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, cancellable};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Most bytes of a keyword (PNG specification, 11.3.3.1).
+/// Maximum length of a keyword (PNG specification, 11.3.3.1).
 const KEYWORD_BYTES: usize = 79;
-/// Bytes of a chunk of compressed data.
+/// Size of an IDAT chunk.
 const CHUNK_BYTES: usize = 1 << 18;
 
 pub(super) fn encode(
@@ -40,13 +40,13 @@ fn try_encode(
     }
     let mut writer = encoder.write_header()?;
     let mut data = writer.stream_writer_with_size(CHUNK_BYTES)?;
-    stoppable::developed(image, options, token, |part| data.write_all(part))?;
+    cancellable::develop_parts(image, options, token, |part| data.write_all(part))?;
     data.finish()?;
     writer.finish()?;
     Ok(bytes)
 }
 
-/// Adds a text. tEXt holds Latin-1, and every reader knows it; iTXt holds the rest.
+/// Adds a text: ASCII as tEXt, which all readers support, and other texts as iTXt.
 pub(super) fn add_text(
     encoder: &mut Encoder<'_, &mut Vec<u8>>,
     name: &str,

@@ -1,5 +1,5 @@
-//! Protection of files beyond their permissions: flags of chattr(1), sticky directories. rename(2) checks them only after
-//! the new file was written.
+//! Protection of files beyond permissions: chattr(1) flags and sticky directories. rename(2) checks these
+//! only after the new file has been written.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -7,10 +7,10 @@ use std::path::Path;
 
 use nix::unistd::{Uid, geteuid};
 
-/// The mode bit of directories in which only owners may replace files.
+/// Mode bit of directories where only owners may replace files.
 const STICKY: u32 = 0o1000;
 
-/// A flag that keeps even root from replacing a file, or the files of a directory.
+/// A flag that prevents even root from replacing a file, or files in a directory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flag {
     /// `chattr +a`
@@ -20,7 +20,7 @@ pub(super) enum Flag {
 }
 
 impl Flag {
-    /// The flag of a file or a directory; `None` if it has neither, or if its file system does not tell.
+    /// The flag of a file or directory. `None` if it has neither or the file system does not report flags.
     #[cfg(target_os = "linux")]
     pub(super) fn of(path: &Path) -> Option<Self> {
         use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
@@ -37,7 +37,7 @@ impl Flag {
         None
     }
 
-    /// The flag in words.
+    /// Description of the flag.
     pub(super) fn words(self) -> &'static str {
         match self {
             Self::AppendOnly => "append-only (chattr +a)",
@@ -45,24 +45,24 @@ impl Flag {
         }
     }
 
-    /// The way to remove it.
+    /// Advice for removing the flag.
     pub(super) fn way_out(self) -> &'static str {
         match self {
-            Self::AppendOnly => "take the flag away (chattr -a) or choose another place",
-            Self::Immutable => "take the flag away (chattr -i) or choose another place",
+            Self::AppendOnly => "remove the flag (chattr -a) or choose another location",
+            Self::Immutable => "remove the flag (chattr -i) or choose another location",
         }
     }
 }
 
-/// Whether a sticky directory protects a file in it from this process: the process owns neither, and may not act for
-/// their owners.
+/// Whether a sticky directory prevents this process from replacing a file: the process owns neither of them
+/// and lacks the capability to act as their owner.
 pub(super) fn is_kept_for_owner(directory: &Metadata, file: &Metadata) -> bool {
     let user = geteuid();
     let is_own = |found: &Metadata| Uid::from_raw(found.uid()) == user;
     directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !acts_for_owners(user)
 }
 
-/// Whether this thread has the rights of owners.
+/// Whether this thread may act as the owner of any file.
 #[cfg(target_os = "linux")]
 fn acts_for_owners(user: Uid) -> bool {
     use rustix::thread::{CapabilitySet, capabilities};
@@ -86,15 +86,16 @@ mod tests {
 
     use super::super::{check_target, write};
 
-    /// A file or directory with a flag, which it loses at the end of the test.
+    /// A file or directory with a flag, which is cleared at the end of the test.
     struct Flagged(PathBuf);
 
     impl Flagged {
-        /// Sets a flag. `None` if the system refuses: for users other than root, and on file systems without flags.
+        /// Sets a flag. `None` if the system refuses: for users other than root, and on file systems without
+        /// flags.
         fn new(path: PathBuf, flag: IFlags) -> Option<Self> {
             let set = change(&path, |flags| flags | flag);
             if let Err(error) = &set {
-                eprintln!("skipped: {} takes no flags: {error}", path.display());
+                eprintln!("skipped: {} does not support flags: {error}", path.display());
             }
             set.is_ok().then(|| Self(path))
         }
@@ -108,7 +109,7 @@ mod tests {
     }
 
     fn change(path: &std::path::Path, to: impl Fn(IFlags) -> IFlags) -> rustix::io::Result<()> {
-        let file = File::open(path).expect("it is there");
+        let file = File::open(path).expect("a file");
         ioctl_setflags(&file, to(ioctl_getflags(&file)?))
     }
 
@@ -120,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn flags_of_the_file_and_its_directory_are_found_before_the_work_and_nothing_is_left() {
+    fn chattr_flags_are_detected_before_writing() {
         let folder = tempfile::tempdir().expect("a folder");
         let directory = folder.path().join("kept");
         let (old, new) = (directory.join("old.png"), directory.join("new.png"));
@@ -139,7 +140,7 @@ mod tests {
             let targets = if flagged == &old { vec![&old, &link] } else { vec![&old, &link, &new] };
             for path in targets {
                 let expected = format!(
-                    "cannot write {}: {called} is {words}; take the flag away {way_out} or choose another place",
+                    "cannot write {}: {called} is {words}; remove the flag {way_out} or choose another location",
                     path.display()
                 );
                 assert_eq!(refused(path), expected);
@@ -147,13 +148,13 @@ mod tests {
             assert_eq!(fs::read_dir(&directory).expect("a directory").count(), 1, "{words}: {called}");
             assert_eq!(fs::read(&old).expect("read"), b"old");
         }
-        write::atomic(&link, b"new").expect("without flags it is replaced");
+        write::atomic(&link, b"new").expect("replaced without flags");
         assert_eq!(fs::read(&old).expect("read"), b"new");
     }
 
-    /// Only root can test this: a thread of its own becomes another user.
+    /// Requires root: a thread changes to another user.
     #[test]
-    fn a_sticky_directory_keeps_files_for_their_owners() {
+    fn sticky_directories_protect_files_of_others() {
         use rustix::thread::{set_thread_res_gid, set_thread_res_uid};
         const NOBODY: u32 = 65534;
         let folder = tempfile::tempdir().expect("a folder");
@@ -182,7 +183,7 @@ mod tests {
         as_nobody(&|| {
             let expected = format!(
                 "cannot write {}: it belongs to another user, and in the sticky directory {} only its owner may \
-                 replace it; choose another name or place",
+                 replace it; choose another name or location",
                 other.display(),
                 folder.path().display()
             );
@@ -194,6 +195,6 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 3);
         write::atomic(&own, b"root's").expect("root acts for owners");
         permit(0o777);
-        as_nobody(&|| write::atomic(&other, b"new").expect("it is not sticky"));
+        as_nobody(&|| write::atomic(&other, b"new").expect("not sticky"));
     }
 }

@@ -1,30 +1,30 @@
-//! The scene's path in the metadata of an image: relative to the image, so that both can be moved together.
+//! Path of the scene in an image's metadata: relative to the image, so that both can be moved together.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use super::place::directory_of;
+use super::resolve_path::directory_of;
 
-/// Returns the path of a scene as seen from an image, with `/` between its names. In the image's own folder it starts with `./`: a
-/// bare file name comes from an earlier version, which did not tell the folder.
+/// Returns the path of a scene relative to an image, with `/` as separator. In the image's own folder it
+/// starts with `./`, because bare file names are from an earlier version, which omitted the folder.
 pub fn relative(scene: &Path, image: &Path) -> String {
     let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
     let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return bare(scene) };
-    let shared = to.components().zip(from.components()).take_while(|(one, other)| one == other).count();
+    let shared = to.components().zip(from.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(shared).map(|_| Component::ParentDir);
     let down = to.components().skip(shared);
     let path: PathBuf = up.chain(down).collect::<PathBuf>().join(name);
-    let names: Vec<_> = path.components().map(|it| it.as_os_str().to_string_lossy()).collect();
+    let names: Vec<_> = path.components().map(|component| component.as_os_str().to_string_lossy()).collect();
     if names.len() == 1 { format!("./{}", names.concat()) } else { names.join("/") }
 }
 
-/// Whether the metadata of an image names this scene.
+/// Whether the scene named in an image's metadata is this scene.
 pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
     if !named.contains('/') {
         return named == bare(scene);
     }
     let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative(scene, image) };
-    // The image may be a link: it has been written by its own name or by that of its target.
+    // The image may be a link that was written using its own path or its target's path.
     let target = fs::canonicalize(image).ok();
     [Some(image), target.as_deref()].into_iter().flatten().any(|image| {
         let file = fs::canonicalize(directory_of(image).join(named));
@@ -32,7 +32,7 @@ pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
     })
 }
 
-/// The file name alone.
+/// File name without its folder.
 fn bare(scene: &Path) -> String {
     scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
@@ -70,11 +70,11 @@ mod tests {
             assert!(is_same(expected, &scene, &at(image)), "{image}");
             assert!(!is_same(expected, &at("c/x"), &at(image)), "{image}");
         }
-        assert_eq!(relative(&scene, &at("none/scene.png")), "scene.toml", "nothing better is known");
+        assert_eq!(relative(&scene, &at("none/scene.png")), "scene.toml", "no folder is known");
     }
 
     #[test]
-    fn scenes_of_one_name_differ_and_old_images_count_by_it() {
+    fn bare_names_match_scenes_in_any_folder() {
         let folder = folder(&["a/scene.toml", "b/scene.toml"]);
         let at = |path: &str| folder.path().join(path);
         let (one, other, image) = (at("a/scene.toml"), at("b/scene.toml"), at("scene.png"));
@@ -85,10 +85,10 @@ mod tests {
     }
 
     #[test]
-    fn links_and_moves_keep_a_scene_with_its_image() {
+    fn links_and_moves_preserve_the_relation() {
         let folder = folder(&["a/scene.toml", "big/x"]);
         let at = |path: &str| folder.path().join(path);
-        // A folder, a scene and an image by links.
+        // Link to a folder, a scene and an image.
         symlink(at("a"), at("link")).expect("a link");
         symlink(at("a/scene.toml"), at("other.toml")).expect("a link");
         let image = at("scene.png");
@@ -100,7 +100,7 @@ mod tests {
         let scene = at("a/scene.toml");
         assert!(is_same(&relative(&scene, &image), &scene, &image));
         assert!(is_same(&relative(&scene, &at("big/scene.png")), &scene, &image));
-        // Both are moved together; then the scene alone.
+        // Move both together, then only the scene.
         let named = relative(&scene, &at("a/scene.png"));
         fs::rename(at("a"), at("moved")).expect("moved");
         assert!(is_same(&named, &at("moved/scene.toml"), &at("moved/scene.png")));
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_no_text_are_the_same_as_themselves() {
+    fn non_utf8_names_match_themselves() {
         use std::ffi::OsStr;
         use std::os::unix::ffi::OsStrExt;
         let folder = folder(&["x"]);

@@ -1,4 +1,4 @@
-//! New files that appear together: written into a hidden folder beside their places, then moved there.
+//! Creates several files atomically: writes them into a hidden folder, then moves them to their destination.
 
 use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File};
@@ -8,16 +8,17 @@ use std::path::{Path, PathBuf};
 
 use super::move_new::move_new;
 use super::temporary::{ATTEMPTS, next_name, remove_stale_folders};
-use super::{OutputError, stoppable};
+use super::{OutputError, cancellable};
 use crate::control::CancelToken;
 use crate::system::folder::remove_all;
 
-/// Writes files that are not there yet, each with its path below a folder: all of them, or none. They go into a hidden folder first;
-/// then each first part of a path gets its place, in the order of the files, never in place of anything. Hidden folders of killed
-/// writers are removed.
+/// Creates files at paths relative to a folder: all of them or none, never overwriting anything. Writes them
+/// into a hidden folder, then moves the first component of each path to its destination, in the order of the
+/// files. Removes hidden folders of killed writers.
 ///
 /// # Errors
-/// Names the path that could not be written, [`ErrorKind::AlreadyExists`] among the reasons; or the token is cancelled.
+/// The path that could not be written, with reasons such as [`ErrorKind::AlreadyExists`]; or the operation
+/// was cancelled.
 pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken) -> Result<(), OutputError> {
     super::write::prepare_process();
     let at = |name: &Path| {
@@ -25,14 +26,14 @@ pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken)
         move |error: io::Error| OutputError::file(&path, error)
     };
     let Some((last, _)) = files.last() else { return Ok(()) };
-    // Write all of them where nobody looks.
+    // Write all files into the hidden folder.
     let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     remove_stale_folders(here);
-    let hidden = Hidden::create(here, last.as_os_str()).map_err(at(last))?;
+    let hidden = StagingFolder::create(here, last.as_os_str()).map_err(at(last))?;
     for (name, bytes) in files {
-        stoppable::or_cancelled(hidden.write(name, bytes, token), at(name))?;
+        cancellable::or_cancelled(hidden.write(name, bytes, token), at(name))?;
     }
-    // Move them into their places; take them back if one is taken by now.
+    // Move them to their destination. Undo that if one of them exists by now.
     let mut placed: Vec<&OsStr> = Vec::new();
     for (name, _) in files {
         let Some(first) = name.iter().next().filter(|first| !placed.contains(first)) else { continue };
@@ -45,8 +46,8 @@ pub fn new_files(folder: &Path, files: &[(PathBuf, &[u8])], token: &CancelToken)
     Ok(())
 }
 
-/// Removes files that were placed, and their folders unless somebody else has put a file there. The caller reports the error that led
-/// to it in any case.
+/// Removes files that were placed, and their folders unless other files have been added. Errors are ignored
+/// because the caller reports the original one.
 fn take_back(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     for (name, _) in
         files.iter().filter(|(name, _)| name.iter().next().is_some_and(|first| placed.contains(&first)))
@@ -58,13 +59,13 @@ fn take_back(folder: &Path, placed: &[&OsStr], files: &[(PathBuf, &[u8])]) {
     }
 }
 
-/// A hidden folder, locked while its writer lives, removed with what is left in it.
-struct Hidden {
+/// A hidden folder that is locked by its writer and removed with its contents on drop.
+struct StagingFolder {
     path: PathBuf,
     _lock: File,
 }
 
-impl Hidden {
+impl StagingFolder {
     fn create(folder: &Path, name: &OsStr) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
             let path = folder.join(next_name(name));
@@ -73,7 +74,7 @@ impl Hidden {
                 Err(error) => return Err(error),
                 Ok(()) => {
                     let lock = File::open(&path)?;
-                    // Without locks, nobody takes it for stale.
+                    // Without lock support, other processes do not consider it stale.
                     let _ = lock.try_lock();
                     return Ok(Self { path, _lock: lock });
                 }
@@ -88,14 +89,14 @@ impl Hidden {
             fs::create_dir_all(parent)?;
         }
         let file = File::create_new(&path)?;
-        stoppable::write_all(&file, bytes, token)?;
+        cancellable::write_all(&file, bytes, token)?;
         file.sync_all()
     }
 }
 
-impl Drop for Hidden {
+impl Drop for StagingFolder {
     fn drop(&mut self) {
-        // Ignore a failure: the next writer tries again.
+        // Ignore errors: the next writer tries again.
         let _ = remove_all(&self.path);
     }
 }
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn all_files_appear_or_none() {
+    fn all_files_are_created_or_none() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
         let files = [
@@ -126,10 +127,10 @@ mod tests {
         new_files(at, &files, &CancelToken::new()).expect("written");
         assert_eq!(names(at), ["a.toml", "a_files"]);
         assert_eq!(names(&at.join("a_files")), ["x.ply", "y.ply"]);
-        // Whatever is there stays: a file, and even an empty folder.
+        // Existing files stay, even an empty folder.
         fs::remove_dir_all(at.join("a_files")).expect("removed");
-        let said = new_files(at, &files, &CancelToken::new()).expect_err("taken").to_string();
-        assert!(said.contains("a.toml"), "{said}");
+        let taken = new_files(at, &files, &CancelToken::new()).expect_err("taken");
+        assert!(matches!(&taken, OutputError::File { path, .. } if path.ends_with("a.toml")), "{taken}");
         assert_eq!(
             (names(at), fs::read(at.join("a.toml")).expect("a file")),
             (vec!["a.toml".to_owned()], b"text".to_vec())
@@ -138,7 +139,7 @@ mod tests {
         fs::create_dir(at.join("a_files")).expect("a folder");
         assert!(new_files(at, &files, &CancelToken::new()).is_err());
         assert_eq!((names(at), names(&at.join("a_files"))), (vec!["a_files".to_owned()], Vec::new()));
-        // A cancelled write leaves nothing.
+        // A cancelled operation leaves nothing.
         fs::remove_dir(at.join("a_files")).expect("removed");
         let token = CancelToken::new();
         token.cancel();
@@ -147,10 +148,10 @@ mod tests {
     }
 
     #[test]
-    fn only_hidden_folders_of_dead_writers_of_this_machine_are_removed() {
+    fn only_staging_folders_of_dead_writers_go() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
-        let living = Hidden::create(at, OsStr::new("a.toml")).expect("a folder");
+        let living = StagingFolder::create(at, OsStr::new("a.toml")).expect("a folder");
         let [stale, foreign] = [dead_name("a.toml"), foreign_name("a.toml")].map(|name| at.join(name));
         let other = at.join(".a.toml.tmp");
         for folder in [&stale, &foreign, &other] {

@@ -1,5 +1,6 @@
-//! Temporary files beside a target: named after their writer's machine and process, locked while it lives, removed when it has
-//! died. Locks alone do not protect them: many network file systems do not share locks between machines.
+//! Temporary files next to a target: named after their writer's machine and process, locked while the writer
+//! lives, and removed after it has died. Locks are not sufficient because many network file systems do not
+//! share them between machines.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -15,12 +16,13 @@ use super::move_new::move_new;
 use crate::system::folder::{names, remove_all};
 use crate::system::machine::ProcessIdentity;
 
-/// Longest file name of nearly every file system.
+/// Maximum length of a file name on nearly all file systems.
 const NAME_BYTES: usize = 255;
-/// Names to try before giving up; a second one is needed only if another program removes the first at the wrong moment.
+/// Number of names to try. A second one is only needed if another program removes the first at the wrong
+/// moment.
 pub(super) const ATTEMPTS: usize = 64;
 
-/// A file that is removed unless it gets its final name.
+/// A file that is removed on drop unless it has been renamed to its final name.
 #[derive(Debug)]
 pub(super) struct Temporary {
     pub(super) file: File,
@@ -47,33 +49,33 @@ impl Temporary {
         Err(io::Error::new(ErrorKind::AlreadyExists, "no free name for a temporary file"))
     }
 
-    /// Locks it. False if another writer took it for a stale file before that.
+    /// Locks the file. Returns false if another writer considered it stale before that.
     fn claim(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
-            // On a file system without locks, nobody can take it for stale.
+            // Without lock support, other processes do not consider it stale.
             Err(TryLockError::Error(_)) => Ok(true),
             Ok(()) => is_same(&self.file, &self.path),
         }
     }
 
-    /// Gives it its final name, replacing any file of that name. Returns the file, still locked.
+    /// Renames the file to its final name, replacing any existing file. Returns the file, still locked.
     pub(super) fn rename_to(mut self, target: &Path) -> io::Result<File> {
-        // A lock is that of the open file, whatever the number of its descriptors.
+        // The lock belongs to the open file, so a duplicate descriptor keeps it.
         let file = self.file.try_clone()?;
         fs::rename(&self.path, target)?;
         self.kept = true;
         Ok(file)
     }
 
-    /// Gives it a name that no file has.
+    /// Renames the file without overwriting.
     pub(super) fn move_to_new(&mut self, target: &Path) -> io::Result<()> {
         move_new(&self.path, target)?;
         self.kept = true;
         Ok(())
     }
 
-    /// Gives it its temporary name back.
+    /// Renames the file back to its temporary name.
     pub(super) fn take_back(&mut self, from: &Path) -> io::Result<()> {
         move_new(from, &self.path)?;
         self.kept = false;
@@ -84,14 +86,14 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.kept {
-            // Ignore a failure: the next write tries again.
+            // Ignore errors: the next write tries again.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// Tests whether a file can be made in a directory. It makes a file without a name, or, if that is not possible, one that
-/// it removes at once. A directory may allow writing and still take no files, such as /proc.
+/// Tests whether files can be created in a directory, using a file without a name or else one that is removed
+/// at once. Some directories, such as /proc, reject files despite write permission.
 pub(super) fn probe(directory: &Path) -> io::Result<()> {
     if nameless(directory).is_ok() {
         return Ok(());
@@ -109,8 +111,9 @@ fn nameless(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// Removes the temporary files of this machine's killed writers from a directory. Files of other machines, of earlier boots and
-/// of living writers stay, and so do kept ones. A file that cannot be removed stays too: it must not prevent the write.
+/// Removes temporary files of this machine's killed writers, except those that `is_kept` protects. Files of
+/// other machines, of earlier boots and of living writers stay. Files that cannot be removed are ignored
+/// because they must not prevent a write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for path in stale(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_file()) && !is_kept(&path) {
@@ -119,7 +122,7 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     }
 }
 
-/// Removes the temporary folders of this machine's killed writers from a directory, with their contents.
+/// Removes temporary folders of this machine's killed writers, with their contents.
 pub(super) fn remove_stale_folders(directory: &Path) {
     for path in stale(directory) {
         if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
@@ -128,7 +131,7 @@ pub(super) fn remove_stale_folders(directory: &Path) {
     }
 }
 
-/// Everything in a directory that is named after a dead writer.
+/// Lists entries of a directory that are named after a dead writer.
 fn stale(directory: &Path) -> Vec<PathBuf> {
     let names = names(directory).into_iter().flatten();
     names.filter(|name| has_dead_writer(name)).map(|name| directory.join(name)).collect()
@@ -139,7 +142,7 @@ fn has_dead_writer(name: &OsStr) -> bool {
 }
 
 fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
-    // Since the check it may have become a link or a pipe.
+    // It may have been replaced by a link or a pipe since the check.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
     if file.try_lock().is_ok() && is_same(&file, path)? {
@@ -148,7 +151,7 @@ fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io:
     Ok(())
 }
 
-/// Whether the open file still has this name.
+/// Whether the open file still has this path.
 fn is_same(file: &File, path: &Path) -> io::Result<bool> {
     let opened = file.metadata()?;
     match fs::symlink_metadata(path) {
@@ -173,8 +176,8 @@ fn name_of(name: &OsStr, writer: &ProcessIdentity) -> OsString {
     result
 }
 
-/// The writer that a temporary name states. `None` for other names, and for those of older versions (`.NAME.glimt-PID-N.tmp`),
-/// which do not say on which machine their writer is.
+/// Parses the writer from a temporary name. `None` for other names, including those of older versions
+/// (`.NAME.glimt-PID-N.tmp`), which do not contain the machine.
 fn writer(name: &OsStr) -> Option<ProcessIdentity> {
     let name = name.to_string_lossy();
     let (_, writer) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once(".glimt-")?;
@@ -194,12 +197,12 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A temporary name of a process of this machine that has ended.
+    /// A temporary name of a process that has ended, on this machine.
     pub(in crate::output) fn dead_name(name: &str) -> OsString {
         name_of(OsStr::new(name), &dead_process())
     }
 
-    /// A temporary name of another machine, whose processes cannot be seen from here.
+    /// A temporary name of a process on another machine.
     pub(in crate::output) fn foreign_name(name: &str) -> OsString {
         let dead = dead_process();
         name_of(OsStr::new(name), &ProcessIdentity { machine: dead.machine ^ 1, ..dead })
@@ -213,7 +216,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn names() {
+    fn only_temporary_names_have_a_writer() {
         for name in ["out.png", "a.glimt-b.png", "a.glimt-1-2.tmp", &"ä".repeat(127)] {
             let temporary = next_name(OsStr::new(name));
             assert_eq!(writer(&temporary), Some(ProcessIdentity::current()), "{temporary:?}");
@@ -238,7 +241,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn only_files_of_dead_writers_of_this_machine_are_removed() {
+    fn only_files_of_dead_local_writers_are_removed() {
         let directory = tempfile::tempdir().expect("a directory");
         let living = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         let write = |name: OsString| {
@@ -247,7 +250,7 @@ pub(super) mod tests {
             path
         };
         let stale = write(dead_name("b.png"));
-        // The writers of these may be alive, though nobody has locked them as seen from here.
+        // The writers of these files may be alive.
         let kept = [
             write(foreign_name("b.png")),
             write(next_name(OsStr::new("b.png"))),
@@ -263,7 +266,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_probe_leaves_nothing() {
+    fn probing_leaves_no_file() {
         let directory = tempfile::tempdir().expect("a directory");
         probe(directory.path()).expect("it takes files");
         assert_eq!(fs::read_dir(directory.path()).expect("a directory").count(), 0);
@@ -273,7 +276,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_panic_leaves_nothing() {
+    fn a_panic_leaves_no_file() {
         let directory = tempfile::tempdir().expect("a directory");
         let result = std::panic::catch_unwind(|| {
             let _file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
@@ -284,7 +287,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_file_that_was_cleared_away_is_not_claimed() {
+    fn removed_files_are_not_claimed() {
         let directory = tempfile::tempdir().expect("a directory");
         let file = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
         fs::remove_file(&file.path).expect("removed");

@@ -9,8 +9,8 @@ fn encode(image: &RadianceImage, options: &EncodeOptions, format: Format) -> Res
     super::encode(image, options, format, &CancelToken::new())
 }
 
-/// Dark to bright, coloured, with flat parts.
-fn picture(width: u32, height: u32) -> RadianceImage {
+/// A colored gradient from dark to bright, with flat parts.
+fn test_image(width: u32, height: u32) -> RadianceImage {
     let pixel = |i: u32| {
         let (x, y) = (i % width, i / width);
         let steps = (x / 5) as f32 / (width as f32 / 5.0);
@@ -29,12 +29,12 @@ fn options(bit_depth: BitDepth) -> EncodeOptions {
 }
 
 fn decode(bytes: &[u8], format: image::ImageFormat) -> image::DynamicImage {
-    image::load_from_memory_with_format(bytes, format).expect("what was encoded is decoded")
+    image::load_from_memory_with_format(bytes, format).expect("a valid image")
 }
 
 #[test]
-fn png_holds_the_developed_picture_at_both_depths() {
-    let image = picture(37, 23);
+fn png_contains_the_tone_mapped_image() {
+    let image = test_image(37, 23);
     for (depth, color) in
         [(BitDepth::Eight, image::ColorType::Rgb8), (BitDepth::Sixteen, image::ColorType::Rgb16)]
     {
@@ -55,8 +55,8 @@ fn png_holds_the_developed_picture_at_both_depths() {
 }
 
 #[test]
-fn png_tells_its_colour_space_and_texts() {
-    let bytes = encode(&picture(8, 8), &options(BitDepth::Eight), Format::Png).expect("a PNG");
+fn png_declares_color_space_and_metadata() {
+    let bytes = encode(&test_image(8, 8), &options(BitDepth::Eight), Format::Png).expect("a PNG");
     let reader = ::png::Decoder::new(Cursor::new(bytes)).read_info().expect("a header");
     let info = reader.info();
     assert!(info.srgb.is_some());
@@ -69,10 +69,10 @@ fn png_tells_its_colour_space_and_texts() {
 }
 
 #[test]
-fn png_texts_that_cannot_be_are_made_so() {
+fn invalid_png_texts_are_sanitized() {
     let name = format!("é{}", "n".repeat(200));
     let metadata = vec![(name, "a\0b".to_owned()), ("\u{1b}".to_owned(), "dropped".to_owned())];
-    let bytes = encode(&picture(1, 1), &EncodeOptions { metadata, ..Default::default() }, Format::Png);
+    let bytes = encode(&test_image(1, 1), &EncodeOptions { metadata, ..Default::default() }, Format::Png);
     let reader = ::png::Decoder::new(Cursor::new(bytes.expect("a PNG"))).read_info().expect("a header");
     let texts = &reader.info().uncompressed_latin1_text;
     assert_eq!(texts.len(), 2);
@@ -80,8 +80,8 @@ fn png_texts_that_cannot_be_are_made_so() {
 }
 
 #[test]
-fn exr_holds_every_bit_unexposed() {
-    let mut image = picture(50, 40);
+fn exr_is_exact_and_ignores_the_exposure() {
+    let mut image = test_image(50, 40);
     let special = [-0.0, 1e-45, f32::MIN_POSITIVE, 1.000_000_1, 65505.0, 1e30, f32::MAX];
     for (pixel, value) in image.pixels.iter_mut().zip(special) {
         pixel.y = value;
@@ -117,8 +117,8 @@ fn read_exr(bytes: &[u8]) -> ((usize, usize), Vec<Vec3>) {
 }
 
 #[test]
-fn exr_tells_its_primaries_and_attributes() {
-    let bytes = encode(&picture(4, 4), &options(BitDepth::Sixteen), Format::Exr).expect("an EXR");
+fn exr_declares_primaries_and_attributes() {
+    let bytes = encode(&test_image(4, 4), &options(BitDepth::Sixteen), Format::Exr).expect("an EXR");
     let meta = ::exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), true).expect("a header");
     let header = &meta.headers[0];
     assert_eq!(header.shared_attributes.chromaticities.expect("primaries").green.x(), 0.30);
@@ -129,12 +129,12 @@ fn exr_tells_its_primaries_and_attributes() {
 }
 
 #[test]
-fn exr_keeps_the_error_of_its_mean_luminance() {
+fn exr_stores_the_error_of_the_mean_luminance() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr");
     let write = |error, format| {
         let options = EncodeOptions { mean_luminance_error: error, ..Default::default() };
-        std::fs::write(&path, encode(&picture(4, 4), &options, format).expect("a file")).expect("written");
+        std::fs::write(&path, encode(&test_image(4, 4), &options, format).expect("a file")).expect("written");
         mean_luminance_error(&path)
     };
     assert_eq!(write(Some(0.012_345_678_9), Format::Exr), Some(0.012_345_678_9));
@@ -145,7 +145,7 @@ fn exr_keeps_the_error_of_its_mean_luminance() {
 }
 
 #[test]
-fn exr_keeps_what_is_negative_and_no_other_format_does() {
+fn only_exr_keeps_negative_values() {
     let pixels = vec![Vec3::new(f32::NAN, -1.0, f32::NEG_INFINITY), Vec3::new(f32::INFINITY, 1.0, -1e-45)];
     let image = RadianceImage { width: 2, height: 1, pixels };
     let bytes = encode(&image, &EncodeOptions::default(), Format::Exr).expect("an EXR");
@@ -161,9 +161,9 @@ fn exr_keeps_what_is_negative_and_no_other_format_does() {
 }
 
 #[test]
-fn hdr_is_within_half_a_step_at_any_width_and_size_of_value() {
+fn hdr_rounds_correctly_at_any_width_and_value() {
     for (width, height) in [(1, 5), (7, 3), (8, 3), (300, 40), (32767, 1), (32768, 1), (40000, 1)] {
-        let mut image = picture(width, height);
+        let mut image = test_image(width, height);
         for (i, pixel) in image.pixels.iter_mut().enumerate() {
             *pixel *= 10_f32.powi((i / 50) as i32 % 60 - 30);
         }
@@ -174,14 +174,13 @@ fn hdr_is_within_half_a_step_at_any_width_and_size_of_value() {
             let error = (Vec3::from_array(decoded.0) - *expected).abs().max_element();
             assert!(error <= expected.max_element() / 255.0, "{decoded:?} {expected} at {width}");
         }
-        assert!(
-            String::from_utf8_lossy(&bytes[..200.min(bytes.len())]).contains("# Scene: scenes/cornell.toml")
-        );
+        let start = String::from_utf8_lossy(&bytes[..200.min(bytes.len())]);
+        assert!(start.contains("Scene: scenes/cornell.toml"));
     }
 }
 
 #[test]
-fn hdr_neither_wraps_nor_loses_the_smallest_and_largest() {
+fn hdr_handles_extreme_values() {
     let values = [1e-45, 1e-39, 1e-37, 0.999, 0.998, 255.5, 1e38, f32::MAX];
     let pixels: Vec<_> = values.iter().map(|&v| Vec3::splat(v)).collect();
     let image = RadianceImage { width: 8, height: 1, pixels };
@@ -194,15 +193,15 @@ fn hdr_neither_wraps_nor_loses_the_smallest_and_largest() {
 }
 
 #[test]
-fn hdr_compresses_flat_lines() {
+fn hdr_compresses_constant_scanlines() {
     let image = RadianceImage::black(1000, 10);
     let bytes = encode(&image, &EncodeOptions::default(), Format::Hdr).expect("an HDR");
     assert!(bytes.len() < 1000, "{} bytes", bytes.len());
 }
 
 #[test]
-fn ppm_holds_the_developed_picture_at_both_depths() {
-    let image = picture(37, 23);
+fn ppm_contains_the_tone_mapped_image() {
+    let image = test_image(37, 23);
     let eight = encode(&image, &options(BitDepth::Eight), Format::Ppm).expect("a PPM");
     let tone = options(BitDepth::Eight).tone;
     let decoded = decode(&eight, image::ImageFormat::Pnm).into_rgb8().into_raw();
@@ -213,8 +212,8 @@ fn ppm_holds_the_developed_picture_at_both_depths() {
 }
 
 #[test]
-fn jpeg_is_near_the_developed_picture_in_colour_too() {
-    // Smooth, with a sharp edge between saturated colours, which subsampled chroma would smear.
+fn jpeg_chroma_is_not_subsampled() {
+    // Smooth, with a sharp edge between saturated colors, which subsampling would blur.
     let pixel = |i: u32| if i % 64 < 31 { Vec3::new(0.8, 0.05, 0.05) } else { Vec3::new(0.05, 0.05, 0.8) };
     let image = RadianceImage { width: 64, height: 64, pixels: (0..64 * 64).map(pixel).collect() };
     let options = EncodeOptions::default();
@@ -228,8 +227,8 @@ fn jpeg_is_near_the_developed_picture_in_colour_too() {
 }
 
 #[test]
-fn webp_has_the_pixels_of_png_and_its_settings() {
-    let image = picture(37, 21);
+fn webp_has_the_same_pixels_and_settings_as_png() {
+    let image = test_image(37, 21);
     let mut options = options(BitDepth::Eight);
     options.metadata.push(("glimt:scene".to_owned(), "a \"b\" <c> & d".to_owned()));
     let bytes = encode(&image, &options, Format::WebP).expect("a WebP");
@@ -239,20 +238,20 @@ fn webp_has_the_pixels_of_png_and_its_settings() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.webp");
     std::fs::write(&path, &bytes).expect("written");
-    let made = super::settings::made(&path).expect("settings");
+    let made = super::settings::read_info(&path).expect("settings");
     assert_eq!((made.format.as_str(), made.size, made.is_own()), ("WebP", Some((37, 21)), true));
     assert!(
         made.settings.contains(&("scene".to_owned(), "a \"b\" <c> & d".to_owned())),
         "{:?}",
         made.settings
     );
-    let wide = encode(&picture(16384, 1), &options, Format::WebP).expect_err("too wide");
-    assert!(wide.to_string().contains("at most 16383×16383"), "{wide}");
+    let wide = encode(&test_image(16384, 1), &options, Format::WebP).expect_err("too wide");
+    assert!(matches!(wide, OutputError::Unsuitable { format: Format::WebP, .. }), "{wide}");
 }
 
 #[test]
-fn the_same_picture_gives_the_same_bytes() {
-    let image = picture(200, 150);
+fn encoding_is_deterministic() {
+    let image = test_image(200, 150);
     for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm, Format::WebP] {
         let once = encode(&image, &options(BitDepth::Eight), format).expect("bytes");
         let again = || encode(&image, &options(BitDepth::Eight), format).expect("bytes");
@@ -265,8 +264,8 @@ fn the_same_picture_gives_the_same_bytes() {
 }
 
 #[test]
-fn endings() {
-    let format = |path: &str| Format::of(Path::new(path)).map_err(|error| error.to_string());
+fn extensions_select_the_format() {
+    let format = |path: &str| Format::from_path(Path::new(path)).map_err(|error| error.to_string());
     assert_eq!(format("a/b.c/out.png"), Ok(Format::Png));
     assert_eq!(format("OUT.JPEG"), Ok(Format::Jpeg));
     assert_eq!(format("x.jpg"), Ok(Format::Jpeg));
@@ -274,27 +273,28 @@ fn endings() {
     assert_eq!(format("x.Hdr"), Ok(Format::Hdr));
     assert_eq!(format("x.ppm"), Ok(Format::Ppm));
     assert_eq!(format("x.WebP"), Ok(Format::WebP));
-    for (path, words) in [
-        ("x.tiff", ".tiff is not a format that glimt writes"),
-        ("x", "no ending"),
-        (".png", "no ending"),
-        ("", "no ending"),
-    ] {
-        let message = format(path).expect_err(path);
-        assert!(message.contains(words), "{message}");
-        assert!(message.contains(".png, .exr, .hdr, .jpg, .jpeg, .ppm, .webp"), "{message}");
+    let error = |path: &str| Format::from_path(Path::new(path)).expect_err(path);
+    let unknown = error("x.tiff");
+    assert!(
+        matches!(&unknown, OutputError::UnknownExtension { extension, .. } if extension == "tiff"),
+        "{unknown}"
+    );
+    for path in ["x", ".png", ""] {
+        let missing = error(path);
+        assert!(matches!(missing, OutputError::NoExtension { .. }), "{missing}");
     }
+    assert!(unknown.to_string().contains(".png, .exr, .hdr, .jpg, .jpeg, .ppm, .webp"), "{unknown}");
 }
 
 #[test]
-fn what_a_format_cannot_hold_is_said() {
-    let deep = encode(&picture(2, 2), &options(BitDepth::Sixteen), Format::Jpeg).expect_err("8 bits only");
-    assert_eq!(deep.to_string(), "a JPEG file cannot hold 16 bits a channel; use .png or .exr");
-    let wide = encode(&picture(65536, 1), &EncodeOptions::default(), Format::Jpeg).expect_err("too wide");
+fn unsuitable_images_are_rejected() {
+    let deep = encode(&test_image(2, 2), &options(BitDepth::Sixteen), Format::Jpeg).expect_err("8 bits only");
+    assert!(matches!(deep, OutputError::Unsuitable { format: Format::Jpeg, .. }), "{deep}");
+    let wide = encode(&test_image(65536, 1), &EncodeOptions::default(), Format::Jpeg).expect_err("too wide");
     assert!(wide.to_string().contains("65536×1"), "{wide}");
-    assert!(encode(&picture(65535, 1), &EncodeOptions::default(), Format::Jpeg).is_ok());
+    assert!(encode(&test_image(65535, 1), &EncodeOptions::default(), Format::Jpeg).is_ok());
     assert!(encode(&RadianceImage::black(0, 3), &EncodeOptions::default(), Format::Png).is_err());
-    let torn = RadianceImage { pixels: Vec::new(), ..picture(3, 3) };
+    let torn = RadianceImage { pixels: Vec::new(), ..test_image(3, 3) };
     assert!(encode(&torn, &EncodeOptions::default(), Format::Jpeg).is_err());
     assert!(BitDepth::try_from(12).is_err());
     assert_eq!(BitDepth::try_from(16).expect("known"), BitDepth::Sixteen);
@@ -304,21 +304,21 @@ const NOTHING_KEPT: write::Guard<'_> = write::Guard {
     is_kept: &|_| false,
     may_replace: &|_| Ok(()),
     sweep: None,
-    losses: Losses::Told(&|_| ()),
+    losses: Losses::Report(&|_| ()),
 };
 
 #[test]
-fn what_is_cancelled_is_neither_encoded_nor_written() {
+fn cancelled_images_are_not_encoded_or_written() {
     let token = CancelToken::new();
     token.cancel();
     for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm, Format::WebP] {
-        let stopped = super::encode(&picture(30, 20), &options(BitDepth::Eight), format, &token);
+        let stopped = super::encode(&test_image(30, 20), &options(BitDepth::Eight), format, &token);
         assert!(matches!(stopped, Err(OutputError::Cancelled(_))), "{format}");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");
     std::fs::write(&path, "old").expect("written");
-    let stopped = write::atomic_until(&path, b"new", &NOTHING_KEPT, &token);
+    let stopped = write::atomic_guarded(&path, b"new", &NOTHING_KEPT, &token);
     assert!(matches!(stopped, Err(OutputError::Cancelled(_))));
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
@@ -334,7 +334,7 @@ fn many_writes_search_a_folder_once() {
         for at in [folder.path(), &other].repeat(2) {
             let stale = at.join(dead_name("stale.png"));
             std::fs::write(&stale, "half").expect("written");
-            write::atomic_until(&at.join("a.png"), b"new", guard, &CancelToken::new()).expect("written");
+            write::atomic_guarded(&at.join("a.png"), b"new", guard, &CancelToken::new()).expect("written");
             kept.push(stale.exists());
         }
         kept
@@ -346,7 +346,7 @@ fn many_writes_search_a_folder_once() {
 }
 
 #[test]
-fn a_guard_is_asked_of_the_real_file_when_the_new_one_is_whole() {
+fn guards_check_the_link_target_after_writing() {
     let folder = tempfile::tempdir().expect("a folder");
     let (link, real) = (folder.path().join("link.png"), folder.path().join("real.png"));
     std::fs::write(&real, "old").expect("written");
@@ -355,20 +355,20 @@ fn a_guard_is_asked_of_the_real_file_when_the_new_one_is_whole() {
     let asked = std::cell::Cell::new(0);
     let may_replace = |path: &std::path::Path| {
         asked.set(asked.get() + 1);
-        assert_eq!((path, entries()), (real.as_path(), 3), "beside its temporary file");
-        Err(OutputError::Refused { reason: "it stays".to_owned() })
+        assert_eq!((path, entries()), (real.as_path(), 3), "next to its temporary file");
+        Err(OutputError::Refused { reason: "no".to_owned() })
     };
     let guard = write::Guard { may_replace: &may_replace, ..NOTHING_KEPT };
-    let refused = write::atomic_until(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
-    assert_eq!((refused.to_string().as_str(), asked.get(), entries()), ("it stays", 1, 2));
+    let refused = write::atomic_guarded(&link, b"new", &guard, &CancelToken::new()).expect_err("refused");
+    assert_eq!((refused.to_string().as_str(), asked.get(), entries()), ("no", 1, 2));
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
 }
 
-/// A writer cannot give a file back to another owner. Only root can test this: a thread of its own becomes `nobody`
-/// towards the file system (setfsuid(2)).
+/// A writer cannot give a file back to its owner. Requires root: a thread becomes `nobody` for the file
+/// system (setfsuid(2)).
 #[cfg(target_os = "linux")]
 #[test]
-fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
+fn replacing_a_file_grants_no_permissions() {
     use nix::unistd::{Gid, Uid, geteuid, setfsgid, setfsuid};
     use std::os::unix::fs::{MetadataExt, PermissionsExt};
     if !geteuid().is_root() {
@@ -382,15 +382,15 @@ fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, "old").expect("written");
     permit(&path, 0o4664);
-    let told = std::sync::Mutex::new(Vec::new());
+    let reports = std::sync::Mutex::new(Vec::new());
     let write = |is_refused: bool| {
         let as_nobody = || {
-            let tell = |what| told.lock().expect("no panic").push(what);
-            let losses = if is_refused { Losses::Refused } else { Losses::Told(&tell) };
+            let report = |what| reports.lock().expect("no panic").push(what);
+            let losses = if is_refused { Losses::Refuse } else { Losses::Report(&report) };
             let guard = write::Guard { losses, ..NOTHING_KEPT };
             setfsgid(Gid::from_raw(65534));
             setfsuid(Uid::from_raw(65534));
-            write::atomic_until(&path, b"new", &guard, &CancelToken::new())
+            write::atomic_guarded(&path, b"new", &guard, &CancelToken::new())
         };
         std::thread::scope(|scope| {
             std::thread::Builder::new()
@@ -400,27 +400,27 @@ fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
                 .expect("no panic")
         })
     };
-    let refused = write(true).expect_err("its owner is root").to_string();
-    assert!(refused.contains("its owner and its group cannot be kept"), "{refused}");
+    let refused = write(true).expect_err("its owner is root");
+    assert!(matches!(refused, OutputError::Target { .. }), "{refused}");
     assert_eq!(std::fs::read(&path).expect("read"), b"old");
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
-    assert!(told.lock().expect("no panic").is_empty());
+    assert!(reports.lock().expect("no panic").is_empty());
     write(false).expect("written");
-    let expected = format!("{}: its owner and its group could not be kept", path.display());
-    assert_eq!(*told.lock().expect("no panic"), [expected]);
+    let lost = ["its owner", "its group"].map(str::to_owned);
+    assert_eq!(*reports.lock().expect("no panic"), [write::not_kept(&path, &lost)]);
     let found = std::fs::metadata(&path).expect("a file");
     assert_eq!((found.uid(), found.mode() & 0o7777), (65534, 0o644));
 }
 
 #[test]
-fn what_is_saved_in_the_moment_of_a_replacement_stays() {
+fn concurrent_saves_are_not_overwritten() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     let refused = || OutputError::Refused { reason: "it has changed".to_owned() };
     let swap = |may_replace: &dyn Fn(&Path) -> Result<(), OutputError>| {
         std::fs::write(&path, "read").expect("written");
         let guard = write::Guard { may_replace, ..NOTHING_KEPT };
-        write::atomic_in_place_of(&path, (b"read", b"new"), &guard, &CancelToken::new())
+        write::atomic_replace(&path, (b"read", b"new"), &guard, &CancelToken::new())
     };
     let has = |text: &str| std::fs::read(&path).expect("read") == text.as_bytes();
     let is_as_read = |path: &Path| match std::fs::read(path) {
@@ -429,14 +429,14 @@ fn what_is_saved_in_the_moment_of_a_replacement_stays() {
     };
     swap(&is_as_read).expect("replaced");
     assert!(has("new"));
-    // An editor saves after the last look: by writing, and by a file of its own in that place.
-    let beside = folder.path().join("edited");
+    // An editor saves after the check: by writing to the file, or by replacing it.
+    let edited = folder.path().join("edited");
     for by_rename in [false, true] {
         let saved = std::cell::Cell::new(false);
         let swapped = swap(&|path| {
             let looked = is_as_read(path);
             if !saved.replace(true) {
-                let to = if by_rename { &beside } else { path };
+                let to = if by_rename { &edited } else { path };
                 std::fs::write(to, "an edit").expect("written");
                 if by_rename {
                     std::fs::rename(to, path).expect("renamed");
@@ -445,7 +445,7 @@ fn what_is_saved_in_the_moment_of_a_replacement_stays() {
             looked
         });
         assert!(matches!(swapped, Err(OutputError::Refused { .. })), "{swapped:?}");
-        assert!(has("an edit"), "by a rename: {by_rename}");
-        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing else is left");
+        assert!(has("an edit"), "{by_rename}");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "no other files");
     }
 }

@@ -1,8 +1,8 @@
-//! WebP without loss: 8 bit sRGB, with the settings in an XMP packet (ISO 16684-1).
+//! Lossless WebP: 8-bit sRGB, with the settings in an XMP packet (ISO 16684-1).
 
 use image_webp::{ColorType, WebPEncoder};
 
-use super::stoppable::{self, Stoppable};
+use super::cancellable::{self, CancellableBuffer};
 use super::{EncodeOptions, Format, OutputError, SOFTWARE, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
@@ -12,17 +12,17 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let picture = stoppable::developed_whole(image, (options, Format::WebP), token)?;
-    let mut bytes = Stoppable::new(token);
+    let pixels = cancellable::develop_all(image, (options, Format::WebP), token)?;
+    let mut bytes = CancellableBuffer::new(token);
     let mut encoder = WebPEncoder::new(&mut bytes);
     encoder.set_xmp_metadata(packet(options).into_bytes());
     encoder
-        .encode(&picture, image.width, image.height, ColorType::Rgb8)
+        .encode(&pixels, image.width, image.height, ColorType::Rgb8)
         .map_err(|error| OutputError::encoder(Format::WebP, &error))?;
     Ok(bytes.into_bytes())
 }
 
-/// The settings as a description of the picture, a line each.
+/// XMP packet with the metadata as the description, one line per item.
 fn packet(options: &EncodeOptions) -> String {
     let lines = options.metadata.iter();
     let lines = lines.map(|(name, value)| escaped(&format!("{}: {}\n", one_line(name), one_line(value))));
@@ -37,7 +37,7 @@ fn packet(options: &EncodeOptions) -> String {
     )
 }
 
-/// Text as XML has it.
+/// Escapes text for XML.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

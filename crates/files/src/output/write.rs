@@ -1,4 +1,4 @@
-//! Atomic writes: the old file stays until the new one is whole.
+//! Atomic writes: the old file stays until the new one is complete.
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -15,112 +15,114 @@ use nix::errno::Errno;
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 
 use super::attributes::{Attributes, Carried};
-use super::place::{self, Place, Target};
+use super::resolve_path::{self, TargetFile, WriteTarget};
 use super::temporary::{self, Temporary};
-use super::{FileIdentity, Losses, OutputError, held, stoppable};
+use super::{FileIdentity, Losses, OutputError, cancellable, held};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
-/// Standard output. It is already open: opening it by this name would fail for a socket.
+/// Standard output. It is not opened by this name, which would fail for sockets.
 pub const STDOUT: &str = "/dev/stdout";
 
-/// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At any moment,
-/// whatever ends the process, the file is the old one or the new one. Its permissions, access list, attributes and flags stay, as
-/// does its owner if this process may give files away. A link stays, and its target is replaced. Temporary files of this
-/// machine's killed writers in the same directory are removed.
+/// Writes a file atomically: writes a locked temporary file next to it, synchronizes it, renames it, and
+/// synchronizes the directory. Whenever the process ends, the file is either the old one or the new one. Its
+/// permissions, access list, attributes and flags are kept, and its owner if this process may change owners.
+/// If the path is a link, its target is replaced. Removes temporary files of this machine's killed writers in
+/// the same directory.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
 /// # Errors
-/// Names the path, the system's message and the way out. The old file is then untouched, and no temporary file is left.
+/// The path, the system's message and advice. The old file is then unchanged, and no temporary file remains.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let losses = Losses::Told(&|_| ());
+    let losses = Losses::Report(&|_| ());
     let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses };
-    atomic_until(path, bytes, &guard, &CancelToken::new())
+    atomic_guarded(path, bytes, &guard, &CancelToken::new())
 }
 
-/// Makes a new file, never in place of another one; leaves no part of it on failure.
+/// Creates a file without overwriting. Leaves no partial file on failure.
 ///
 /// # Errors
-/// The system's, [`ErrorKind::AlreadyExists`] among them.
+/// System errors such as [`ErrorKind::AlreadyExists`].
 pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    if written.is_err() && FileIdentity::of(path).is_some_and(|there| there.is_of(&file)) {
-        // The file is still ours; the caller reports the error in any case.
+    if written.is_err() && FileIdentity::of(path).is_some_and(|found| found.is_of(&file)) {
+        // The file is still ours. Ignore errors because the caller reports the original one.
         let _ = fs::remove_file(path);
     }
     written
 }
 
-/// Files that a write must not touch. Both functions are called at the last moment, with the real path, links followed.
+/// Policy for existing files. Both functions are called just before the replacement, with the resolved path.
 pub struct Guard<'a> {
-    /// Whether to keep a file with the name of a killed writer's temporary file.
+    /// Whether to keep a file that is named like the temporary file of a killed writer.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
-    /// Whether the new file may replace this one, existing or not; or whether it may be written in place.
+    /// Whether this file, existing or not, may be replaced or written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
     /// Folders already searched for temporary files of killed writers. `None` to search at every write.
     pub sweep: Option<&'a FolderSweep>,
-    /// Policy for a file whose owner, access list or attributes cannot be kept.
+    /// What to do about a file whose owner, access list or attributes cannot be kept.
     pub losses: Losses<'a>,
 }
 
-/// Folders from which temporary files of killed writers were removed: writing many files to a folder searches it once.
+/// Folders already searched for temporary files of killed writers, so that many writes search a folder once.
 #[derive(Debug, Default)]
 pub struct FolderSweep(RefCell<HashSet<PathBuf>>);
 
 impl FolderSweep {
-    /// Whether the folder has not been searched yet. Then it counts as searched.
+    /// Returns whether the folder has not been searched yet, and marks it as searched.
     fn is_due(&self, folder: &Path) -> bool {
         let mut searched = self.0.borrow_mut();
         !searched.contains(folder) && searched.insert(folder.to_owned())
     }
 }
 
-/// [`atomic`] with a guard; it can be stopped until the new file is whole.
+/// [`atomic`] with a guard. Can be cancelled until the new file is complete.
 ///
 /// # Errors
-/// As [`atomic`], the guard's errors, and [`OutputError::Cancelled`].
-pub fn atomic_until(
+/// The errors of [`atomic`] and of the guard, and [`OutputError::Cancelled`].
+pub fn atomic_guarded(
     path: &Path,
     bytes: &[u8],
     guard: &Guard<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, (token, Durability::Power))
+    atomic_with(path, &|file| cancellable::write_all(file, bytes, token), guard, (token, Durability::Power))
         .map(drop)
 }
 
-/// [`atomic_until`] in place of a file with this content alone: if it has another one in the moment of the replacement, it stays,
-/// and the guard tells the reason.
+/// [`atomic_guarded`] that only replaces a file with the expected content. If the content has changed by the
+/// time of the replacement, the file is kept and the guard determines the error.
 ///
 /// # Errors
-/// As [`atomic_until`].
-pub fn atomic_in_place_of(
+/// Same as [`atomic_guarded`].
+pub fn atomic_replace(
     path: &Path,
     (expected, bytes): (&[u8], &[u8]),
     guard: &Guard<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    let content: &dyn Fn(&mut dyn Write) -> io::Result<()> = &|file| stoppable::write_all(file, bytes, token);
+    let content: &dyn Fn(&mut dyn Write) -> io::Result<()> =
+        &|file| cancellable::write_all(file, bytes, token);
     replace(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
 }
 
-/// Events that a file survives from the moment at which it has its name.
+/// Events that a file survives once it has its final name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
-    /// The end of the process: the system writes the bytes to the disk when it likes.
+    /// The end of the process. The system writes the bytes to disk later.
     Process,
-    /// A loss of power: the bytes are on the disk.
+    /// A power failure. The bytes are on disk.
     Power,
 }
 
-/// [`atomic_until`] of bytes that are made while they are written: `content` writes all of them, as often as it is called. Returns the
-/// new file, which stays locked against other processes until it is closed. `None` if it was written in place.
+/// [`atomic_guarded`] for generated content: `content` writes all bytes each time it is called. Returns the new
+/// file, which stays locked until it is closed. `None` if it was written in place.
 ///
 /// # Errors
-/// As [`atomic_until`], and the errors of `content`.
-pub fn atomic_by(
+/// The errors of [`atomic_guarded`] and of `content`.
+pub fn atomic_with(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &Guard<'_>,
@@ -129,7 +131,7 @@ pub fn atomic_by(
     replace(path, content, guard, (token, durability, None))
 }
 
-/// [`atomic_by`], in place of a file with the expected content if there is one.
+/// [`atomic_with`], optionally for a file with the expected content.
 fn replace(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
@@ -138,19 +140,19 @@ fn replace(
 ) -> Result<Option<File>, OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
-    match place::find(path)? {
-        Place::File(target) => {
-            let (new, carried) = beside(&target, guard).map_err(named)?;
+    match resolve_path::find(path)? {
+        WriteTarget::File(target) => {
+            let (new, carried) = create_temporary(&target, guard).map_err(named)?;
             let lost = carried.as_ref().map_or(&[][..], |carried| &carried.lost);
-            if let (Losses::Refused, false) = (guard.losses, lost.is_empty()) {
+            if let (Losses::Refuse, false) = (guard.losses, lost.is_empty()) {
                 let why = format!("{} cannot be kept", lost.join(" and "));
                 return Err(OutputError::Target {
                     path: path.to_owned(),
                     why,
-                    way_out: "change a copy of it",
+                    way_out: "edit a copy instead",
                 });
             }
-            stoppable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
+            cancellable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
@@ -158,7 +160,7 @@ fn replace(
                     Some(file) => file,
                     None => {
                         (guard.may_replace)(&target.path)?;
-                        return Err(named(io::Error::other("it changed while it was written")));
+                        return Err(named(io::Error::other("it was changed in the meantime")));
                     }
                 },
             };
@@ -166,43 +168,48 @@ fn replace(
                 Durability::Process => Ok(()),
                 Durability::Power => sync_directory(target.directory()),
             };
-            if let (Err(error), Losses::Told(tell)) = (synced, &guard.losses) {
-                // The file has its name: only a loss of power could take it back.
-                tell(format!(
-                    "{}: it is written, but its folder could not be synchronized: {}",
+            if let (Err(error), Losses::Report(report)) = (synced, &guard.losses) {
+                // The file has its final name. Only a power failure could undo that.
+                report(format!(
+                    "{}: written, but its folder could not be synchronized: {}",
                     path.display(),
                     describe_error(&error)
                 ));
             }
-            if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
-                tell(format!("{}: {} could not be kept", path.display(), lost.join(" and ")));
+            if let (Losses::Report(report), false) = (guard.losses, lost.is_empty()) {
+                report(not_kept(path, lost));
             }
             Ok(Some(file))
         }
-        Place::InPlace(place) => {
-            (guard.may_replace)(&place)?;
+        WriteTarget::InPlace(device) => {
+            (guard.may_replace)(&device)?;
             let mut bytes = Vec::new();
-            stoppable::or_cancelled(content(&mut bytes), named)?;
-            stoppable::or_cancelled(in_place(&place, &bytes, token), named)?;
+            cancellable::or_cancelled(content(&mut bytes), named)?;
+            cancellable::or_cancelled(in_place(&device, &bytes, token), named)?;
             Ok(None)
         }
     }
 }
 
-/// Makes a file that would grow beyond `ulimit -f` an error instead of the end of the process (SIGXFSZ). [`atomic`]
-/// does it by itself; it is needed once for files written in other ways.
+/// Report about attributes that could not be carried over.
+pub(super) fn not_kept(path: &Path, lost: &[String]) -> String {
+    format!("{}: {} could not be kept", path.display(), lost.join(" and "))
+}
+
+/// Turns writing beyond `ulimit -f` into an error instead of a fatal signal (SIGXFSZ). [`atomic`] does this
+/// itself; call it once for files written in other ways.
 pub fn prepare_process() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        // Any handler will do, as the write then fails. Without one, the signal ends the process as it did before.
+        // Any handler makes the write fail instead. Without one, the signal ends the process.
         let unused = Arc::new(AtomicBool::new(false));
         let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, unused);
     });
 }
 
-/// Makes the new file, empty, beside the one that it is to replace, with the attributes of that. Until it is whole,
+/// Creates an empty temporary file next to its target, with the target's attributes. Until it is complete,
 /// only its owner and users on its access list can read it.
-fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
+fn create_temporary(target: &TargetFile, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
     let directory = target.directory();
     if guard.sweep.is_none_or(|sweep| sweep.is_due(directory)) {
         temporary::remove_stale(directory, guard.is_kept);
@@ -210,7 +217,7 @@ fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<C
     let mode = if target.existing.is_some() { 0o600 } else { 0o666 };
     let name = target.path.file_name().unwrap_or(OsStr::new("file"));
     let new = Temporary::create(directory, name, mode)?;
-    let old = target.existing.as_ref().map(|existing| Attributes::of(&target.path, existing));
+    let old = target.existing.as_ref().map(|existing| Attributes::read(&target.path, existing));
     let carried = old.map(|old| old.carry_over(&new.file));
     Ok((new, carried))
 }
@@ -223,7 +230,7 @@ fn fill(
 ) -> io::Result<()> {
     content(&mut &new.file)?;
     if let Some(carried) = carried {
-        carried.permit(&new.file)?;
+        carried.apply_mode(&new.file)?;
     }
     match durability {
         Durability::Process => Ok(()),
@@ -231,8 +238,8 @@ fn fill(
     }
 }
 
-/// Synchronises a directory, so that the rename survives a loss of power. Failures are ignored, as some file systems and
-/// directories refuse: the file is there.
+/// Synchronizes a directory, so that a rename survives a power failure. Ignores file systems and directories
+/// that do not support this.
 fn sync_directory(directory: &Path) -> io::Result<()> {
     use ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
     match File::open(directory).and_then(|directory| directory.sync_all()) {
@@ -241,29 +248,29 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Writes in place. It appends, so that a descriptor of a file keeps its content.
+/// Writes in place, appending so that the content of an open file is kept.
 fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
-        // Flush earlier output first; do not hold its lock while the reader takes its time.
+        // Flush earlier output first, and do not hold the lock while the reader may block.
         io::stdout().flush()?;
         let stdout = File::from(io::stdout().as_fd().try_clone_to_owned()?);
-        return stoppable::write_as_taken(&stdout, bytes, token);
+        return cancellable::write_to_pipe(&stdout, bytes, token);
     }
     let mut options = OpenOptions::new();
     options.append(true);
-    // A pipe that nobody reads would block the process for ever: do not wait, so that it is an error.
+    // Opening a pipe without a reader would block forever. Make it an error instead.
     let is_pipe = fs::metadata(path)?.file_type().is_fifo();
     if is_pipe {
         options.custom_flags(OFlag::O_NONBLOCK.bits());
     }
     let file = options.open(path).map_err(|error| match error.raw_os_error() {
         Some(number) if is_pipe && number == Errno::ENXIO as i32 => {
-            io::Error::new(ErrorKind::NotConnected, "nobody reads this pipe")
+            io::Error::new(ErrorKind::NotConnected, "the pipe has no reader")
         }
         _ => error,
     })?;
     if is_pipe {
         fcntl(&file, FcntlArg::F_SETFL(OFlag::O_APPEND))?;
     }
-    stoppable::write_as_taken(&file, bytes, token)
+    cancellable::write_to_pipe(&file, bytes, token)
 }

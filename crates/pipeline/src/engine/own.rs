@@ -10,7 +10,7 @@ use crate::control::CancelToken;
 use crate::identity::ImageDependencies;
 use crate::keys;
 use crate::memory::MemoryEstimate;
-use crate::output::part::Trait;
+use crate::output::part::Dependency;
 use crate::plan::{Plan, plan};
 use crate::protocol::{Failure, OwnState, Request, Status, Writing, reasons};
 use crate::render::checkpointer::{CheckpointContext, Checkpointer};
@@ -57,7 +57,7 @@ impl OwnImage {
     }
 
     /// Returns the names and values of everything that the image depends on.
-    pub(super) fn identity(&self) -> Vec<Trait> {
+    pub(super) fn identity(&self) -> Vec<Dependency> {
         let divided = self.share.as_ref().map(|share| share.samples);
         let Self { parsed, plan, camera, files, .. } = self;
         ImageDependencies { parsed, plan, camera, files, divided }.traits()

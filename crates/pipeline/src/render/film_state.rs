@@ -10,7 +10,7 @@ use crate::film::{
     CELLS, Convergence, Film, FilmError, PixelSubset, Pixels, Previewer, RadianceImage, Rect, SumOrder,
 };
 use crate::integrators::RayCounters;
-use crate::output::part::Trait;
+use crate::output::part::Dependency;
 use crate::plan::Plan;
 use crate::render::noise_goals::Goals;
 use crate::render::share::Share;
@@ -59,7 +59,7 @@ pub(crate) struct FilmState {
     /// Whether a checkpoint contains all samples.
     pub(crate) is_kept: bool,
     /// Names and values of everything that the image depends on. `None` until first needed.
-    pub(crate) identity: Option<Vec<Trait>>,
+    pub(crate) identity: Option<Vec<Dependency>>,
     /// Whether the film was read from a finished part.
     pub(crate) is_finished_part: bool,
 }

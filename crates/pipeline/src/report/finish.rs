@@ -7,7 +7,7 @@ use crate::control::CancelToken;
 use crate::film::range_map::RangeMap;
 use crate::inputs::Inputs;
 use crate::integrators::{RayCounters, receivers};
-use crate::output::write::{Guard, atomic_until};
+use crate::output::write::{Guard, atomic_guarded};
 use crate::output::{OutputError, json};
 use crate::plan::Plan;
 use crate::protocol::StageReport;
@@ -63,7 +63,7 @@ pub(crate) fn write_report(
         |error: serde_json::Error| OutputError::File { path: path.clone(), source: error.into() };
     let text = json::file(report).map_err(unwritable)?;
     let target = (OutputTarget::report(path), None);
-    guarded(plan, inputs, target, sink, |guard| atomic_until(path, text.as_bytes(), guard, token))
+    guarded(plan, inputs, target, sink, |guard| atomic_guarded(path, text.as_bytes(), guard, token))
 }
 
 /// Removes the report of an earlier image that an unfinished image has replaced. Keeps files that a report must not

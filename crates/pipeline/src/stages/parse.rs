@@ -10,7 +10,7 @@ use super::super::protocol::{Failure, reasons};
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
 use super::{Findings, Staged, Stop};
-use crate::assets::gltf::{is_gltf, referenced_files};
+use crate::assets::gltf::{self, is_gltf};
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
@@ -102,9 +102,10 @@ pub(crate) fn parse(
     if let Held::Differs(held) = held::recover(path) {
         let help =
             Some("compare both files, save the one you need as the scene, and remove the other".to_owned());
-        findings
-            .warnings
-            .push(Diagnostic { help, ..file_diagnostic(path, Severity::Warning, held::words(&held)) });
+        findings.warnings.push(Diagnostic {
+            help,
+            ..file_diagnostic(path, Severity::Warning, held::backup_warning(&held))
+        });
     }
     let content = contents.read(path, token)?;
     let is_model = is_model(path);
@@ -221,7 +222,7 @@ fn referenced_files(loaded: &scene::Loaded) -> Vec<PathBuf> {
     }
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     for path in textures.into_iter().chain(&loaded.named).filter(|path| is_gltf(path) && !is_read(path)) {
-        named.extend(referenced_files(path).unwrap_or_default());
+        named.extend(gltf::referenced_files(path).unwrap_or_default());
     }
     named
 }

@@ -20,10 +20,10 @@ use crate::control::CancelToken;
 use crate::film::tone::develop;
 use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{AovSource, LightAov};
-use crate::output::part::{self, Head, Kind};
+use crate::output::part::{self, Head, PartKind};
 use crate::output::write::{Durability, FolderSweep, Guard};
-use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError, scene_path};
-use crate::output::{MovingFormat, moving};
+use crate::output::{self, BitDepth, DevelopSettings, Format, LayerImage, OutputError, scene_path};
+use crate::output::{AnimationFormat, animation};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// Metadata key of the scene file.
@@ -84,9 +84,9 @@ pub(crate) struct Destination<'a> {
 pub(crate) fn check_targets(writing: Writing, plan: &Plan, sink: &Sink) -> Result<(), Stop> {
     match writing {
         Writing::No => Ok(()),
-        Writing::Must => find_targets(plan, output::check_target, output::check_place).map_err(Stop::work),
+        Writing::Must => find_targets(plan, output::check_target, output::check_path).map_err(Stop::work),
         Writing::Try => {
-            if let Err(error) = find_targets(plan, output::look_at_target, output::look_at_place) {
+            if let Err(error) = find_targets(plan, output::inspect_target, output::inspect_path) {
                 sink.write_failed(None, error.to_string());
             }
             Ok(())
@@ -101,7 +101,7 @@ fn find_targets(
 ) -> Result<(), OutputError> {
     let check = |path: &PathBuf| {
         let format = target(path)?;
-        format.check_picture(
+        format.check_image(
             plan.settings.render.width,
             plan.settings.render.height,
             BitDepth::try_from(plan.bit_depth)?,
@@ -255,11 +255,11 @@ pub(crate) fn write_animation(
         max: samples.iter().map(|one| one.max).max().unwrap_or(0),
     };
     for path in &plan.moving {
-        let Some(format) = MovingFormat::of(path) else { continue };
+        let Some(format) = AnimationFormat::from_path(path) else { continue };
         let write = || {
             let metadata = finish_at(plan, path).metadata_with(samples);
-            let bytes = moving::encode(&frames, &metadata, format, token)?;
-            let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
+            let bytes = animation::encode(&frames, &metadata, format, token)?;
+            let write = |guard: &Guard<'_>| output::write::atomic_guarded(path, &bytes, guard, token);
             guarded(plan, inputs, (OutputTarget::picture(plan, path), None), sink, write)?;
             Ok(bytes.len() as u64)
         };
@@ -284,9 +284,9 @@ fn write_one(
     if let Some(seconds) = state.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
     }
-    let bytes = finish.encode(&state.film, (image, layers), Format::of(path)?, token)?;
+    let bytes = finish.encode(&state.film, (image, layers), Format::from_path(path)?, token)?;
     let target = (OutputTarget::picture(plan, path), Some(sweep));
-    guarded(plan, inputs, target, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
+    guarded(plan, inputs, target, sink, |guard| output::write::atomic_guarded(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 
@@ -299,7 +299,7 @@ fn write_part(
 ) -> Result<u64, OutputError> {
     let identity = state.identity.clone().unwrap_or_default();
     let scene = scene_path::relative(&plan.path, path);
-    let head = Head { scene, ..head(Kind::Part, state, identity, &finish(plan)) };
+    let head = Head { scene, ..head(PartKind::Part, state, identity, &finish(plan)) };
     let save = |guard: &Guard<'_>| {
         part::save(path, &head, &state.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
@@ -308,8 +308,8 @@ fn write_part(
 }
 
 /// Returns the settings with which a film is developed and encoded.
-pub(crate) fn finish(plan: &Plan) -> Finish {
-    Finish {
+pub(crate) fn finish(plan: &Plan) -> DevelopSettings {
+    DevelopSettings {
         quantity: plan.settings.view.quantity(),
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
@@ -319,7 +319,7 @@ pub(crate) fn finish(plan: &Plan) -> Finish {
 }
 
 /// Like [`finish`], with the scene's path relative to the image.
-fn finish_at(plan: &Plan, path: &Path) -> Finish {
+fn finish_at(plan: &Plan, path: &Path) -> DevelopSettings {
     let mut finish = finish(plan);
     let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
     if let Some((_, value)) = scene {

@@ -12,7 +12,7 @@ use crate::exit::Exit;
 use crate::lower::STDOUT_NAME;
 use crate::output::write::{self, Guard};
 use crate::output::{
-    self, FileIdentity, Losses, OutputError, is_one_file, replaced_json, replaced_plot, replaced_table,
+    self, FileIdentity, Losses, OutputError, is_same_file, replaced_json, replaced_plot, replaced_table,
 };
 use crate::system::{describe_error, file};
 
@@ -74,7 +74,7 @@ impl BenchOutputs {
                 format!("cannot write {}: plots are SVG files; use the extension .svg", path.display());
             return Err(OutputError::Refused { reason });
         }
-        output::check_place(path)
+        output::check_path(path)
     }
 
     /// Checks that output `index`, which resolves to `real`, is neither an input nor another output.
@@ -82,7 +82,7 @@ impl BenchOutputs {
         if FileIdentity::of(real).is_none() {
             return Ok(());
         }
-        let is_it = |path: &Path| is_one_file(real, path);
+        let is_it = |path: &Path| is_same_file(real, path);
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(
@@ -111,7 +111,7 @@ impl BenchOutputs {
             }
             OutputKind::Plot => replaced_plot(real, &plot::AXES),
         };
-        let Some(why) = replaced.why_kept() else { return Ok(()) };
+        let Some(why) = replaced.reason_to_keep() else { return Ok(()) };
         let way_out = format!("choose another file with {option} FILE, or use --force");
         Err(OutputError::Refused { reason: format!("cannot write {}: {why}; {way_out}", path.display()) })
     }
@@ -160,9 +160,9 @@ impl BenchOutputs {
             content(*kind, results).map_err(|why| format!("cannot write {}: {why}", path.display()))?;
         let may_replace = |real: &Path| self.may_replace(index, real);
         let is_kept = |path: &Path| self.inputs.iter().any(|(_, input)| input == path);
-        let losses = Losses::Told(&|what| progress.warned(&what));
+        let losses = Losses::Report(&|what| progress.warned(&what));
         let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, sweep: None, losses };
-        let written = write::atomic_until(path, &bytes, &guard, token);
+        let written = write::atomic_guarded(path, &bytes, &guard, token);
         written.map(|()| bytes.len()).map_err(|error| error.to_string())
     }
 }

@@ -204,7 +204,7 @@ pub struct ModelLight {
     pub kind: ModelLightKind,
     /// Intensity in cd, or illuminance in lx for directional lights, for red, green and blue.
     pub intensity: DVec3,
-    /// Its place.
+    /// Position.
     pub position: DVec3,
     /// Direction in which the light travels.
     pub direction: DVec3,
@@ -231,7 +231,7 @@ pub enum ModelLightKind {
 pub struct ModelCamera {
     /// Name, possibly empty.
     pub name: String,
-    /// The eye.
+    /// Eye position.
     pub position: DVec3,
     /// Viewing direction, a unit vector.
     pub direction: DVec3,

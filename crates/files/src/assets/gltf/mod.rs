@@ -4,7 +4,7 @@
 //!
 //! `serde_json` parses the JSON into the types of `json`; `base64` decodes data URIs. The crate `gltf` 1.4 is
 //! not used: without its validation it panics on indices out of range, and its validation rejects all
-//! required extensions that it does not know. Only using its types (`gltf-json`) would replace only the simple
+//! required extensions that it does not know. Using only its types (`gltf-json`) would replace just the simple
 //! half of `json`: clear coats, WebP and Basis images and instancing would have to be parsed from raw values,
 //! errors in flattened extensions would lose their line, and the text of data URIs would stay in memory.
 
@@ -183,7 +183,7 @@ impl Container {
         Ok(container)
     }
 
-    /// The file.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }

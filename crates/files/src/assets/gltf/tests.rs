@@ -11,9 +11,9 @@ use crate::assets::{LoadedMesh, rejection};
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// A temporary folder with glTF files.
-struct TestDir(tempfile::TempDir);
+struct GltfDir(tempfile::TempDir);
 
-impl TestDir {
+impl GltfDir {
     fn new() -> Self {
         Self(tempfile::tempdir().expect("a folder"))
     }
@@ -30,7 +30,7 @@ impl TestDir {
 }
 
 fn open_json(json: &Value) -> Result<Container, AssetError> {
-    TestDir::new().open("a.gltf", json.to_string().as_bytes())
+    GltfDir::new().open("a.gltf", json.to_string().as_bytes())
 }
 
 fn part(container: &Container, number: usize) -> Result<LoadedMesh, AssetError> {
@@ -117,7 +117,7 @@ fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
 
 #[test]
 fn parts_do_not_depend_on_the_kind_of_buffer() {
-    let folder = TestDir::new();
+    let folder = GltfDir::new();
     let embedded =
         part(&folder.open("a.gltf", square().to_string().as_bytes()).expect("read"), 0).expect("a mesh");
     assert_eq!(
@@ -202,7 +202,7 @@ fn hidden_nodes_hide_their_descendants() {
 
 #[test]
 fn buffers_may_look_like_utf16() {
-    let folder = TestDir::new();
+    let folder = GltfDir::new();
     // Two 16-bit numbers that look like letters in UTF-16.
     let mut json = square();
     json["bufferViews"][0]["byteOffset"] = json!(4);
@@ -493,7 +493,7 @@ fn old_versions_and_wrong_types_are_rejected() {
 /// Some programs write unpadded chunks, or bytes after the end declared by the header.
 #[test]
 fn unpadded_chunks_and_trailers_are_accepted() {
-    let folder = TestDir::new();
+    let folder = GltfDir::new();
     let mut json = square();
     json["buffers"][0].as_object_mut().expect("an object").remove("uri");
     let expected = part(&folder.open("a.glb", &glb(&json, &bytes())).expect("read"), 0).expect("a mesh").mesh;
@@ -518,7 +518,7 @@ fn unpadded_chunks_and_trailers_are_accepted() {
 /// An image that is missing or damaged after its header is reported by its index.
 #[test]
 fn invalid_images_are_reported_by_their_index() {
-    let folder = TestDir::new();
+    let folder = GltfDir::new();
     let mut json = square();
     let mut png = Vec::new();
     let pixels = ::image::RgbImage::from_fn(8, 8, |x, y| ::image::Rgb([x as u8 * 9, y as u8 * 7, 3]));
@@ -549,7 +549,7 @@ fn invalid_images_are_reported_by_their_index() {
 
 #[test]
 fn truncated_and_foreign_glbs_are_rejected() {
-    let folder = TestDir::new();
+    let folder = GltfDir::new();
     let mut json = square();
     json["buffers"][0].as_object_mut().expect("an object").remove("uri");
     let complete = glb(&json, &bytes());
@@ -579,7 +579,7 @@ proptest! {
         if cut % 4 == 0 {
             file.truncate(usize::from(cut) % file.len());
         }
-        if let Ok(container) = TestDir::new().open("a.glb", &file) {
+        if let Ok(container) = GltfDir::new().open("a.glb", &file) {
             let _ = scene(&container);
             let _ = container.merged_scene(&CancelToken::new());
             for number in 0..container.parts() {
@@ -591,7 +591,7 @@ proptest! {
 
 #[test]
 fn referenced_files_are_listed_from_the_json() {
-    let folder = TestDir::new();
+    let folder = GltfDir::new();
     let mut json = square();
     json["buffers"] = serde_json::json!([{"uri": "deep/a.bin", "byteLength": 9}, {"byteLength": 1, "uri": "data:;base64,AA=="}]);
     json["images"] = serde_json::json!([{"uri": "a%20b.png"}, {"bufferView": 0}, {"uri": "/etc/passwd"}]);

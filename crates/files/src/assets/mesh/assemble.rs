@@ -12,7 +12,7 @@ use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::origin_near;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Faces between two polls of the token.
+/// Faces between two polls of the cancel token.
 const BATCH: usize = 1 << 14;
 
 /// Assembles a mesh: triangulates polygons, drops unusable faces, removes unused vertices and completes the

@@ -7,7 +7,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::Vec2;
 
-/// Corners between two polls of the token.
+/// Corners between two polls of the cancel token.
 const BATCH: usize = 1 << 14;
 
 /// Vertex index, texture coordinates (bits) and color of a corner.

@@ -26,7 +26,7 @@ pub use normals::vertex_normals;
 const FILE_LIMIT: u64 = 4 << 30;
 
 /// File name extensions that [`load`] supports.
-pub const ENDINGS: [&str; 4] = ["obj", "off", "ply", "stl"];
+pub const EXTENSIONS: [&str; 4] = ["obj", "off", "ply", "stl"];
 
 /// Reads a mesh file in the format given by its extension, ignoring case.
 ///
@@ -185,12 +185,12 @@ mod tests {
     proptest! {
         #[test]
         fn garbage_never_panics(bytes in proptest::collection::vec(any::<u8>(), 0..200), text in wordy()) {
-            for ending in ENDINGS {
+            for ending in EXTENSIONS {
                 let _ = try_bytes(&format!("a.{ending}"), &bytes);
                 let _ = try_bytes(&format!("a.{ending}"), text.as_bytes());
             }
             for start in ["OFF\n3 1 0\n", "ply\nformat ascii 1.0\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "solid\nfacet normal 0 0 1\nouter loop\n"] {
-                for ending in ENDINGS {
+                for ending in EXTENSIONS {
                     let _ = try_bytes(&format!("a.{ending}"), format!("{start}{text}").as_bytes());
                 }
             }

@@ -83,7 +83,7 @@ fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
 /// Whether a mesh without normals consists of flat faces, like a box: the normals of the faces around most
 /// vertices partly cancel.
 pub(crate) fn is_faceted(mesh: &TriangleMesh) -> bool {
-    /// Minimum length of the mean unit normal around a vertex of a smooth surface: that of a cone with a
+    /// Minimum length of the mean unit normal around a vertex of a smooth surface, reached by a cone with a
     /// half-angle of 32 degrees.
     const LEAST: f32 = 0.85;
     let groups = &mesh.normal_groups;

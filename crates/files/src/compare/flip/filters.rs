@@ -1,36 +1,37 @@
-//! The eye's filters: contrast sensitivity as a blur of each opponent channel, edge and point detection on lightness.
+//! Filters of the visual system: contrast sensitivity as a blur of each opponent channel, edge and point
+//! detection on lightness.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::super::plane::{Plane, gaussian, normalised, offsets};
+use super::super::plane::{Plane, gaussian, normalized, offsets};
 
-/// One Gaussian of a contrast sensitivity function: its amplitude, and its width in square degrees.
+/// A Gaussian of a contrast sensitivity function: amplitude, and width in square degrees.
 #[derive(Clone, Copy)]
 struct Term {
     a: f64,
     b: f64,
 }
 
-/// Achromatic, red–green, blue–yellow (the paper, table 1; the second terms of the first two are 0).
+/// Achromatic, red–green and blue–yellow (table 1 of the paper; second terms of 0 are omitted).
 const SENSITIVITY: [&[Term]; 3] = [
     &[Term { a: 1.0, b: 0.0047 }],
     &[Term { a: 1.0, b: 0.0053 }],
     &[Term { a: 34.1, b: 0.04 }, Term { a: 13.5, b: 0.025 }],
 ];
-/// Width of the widest term.
+/// Width of the widest Gaussian.
 const WIDEST: f64 = 0.04;
-/// Width of the feature that the eye sees best, degrees.
+/// Size in degrees of the feature that the eye detects best.
 const FEATURE_DEGREES: f64 = 0.082;
-/// Reach of a filter, in widths of its Gaussian.
+/// Filter radius in standard deviations.
 const REACH: f64 = 3.0;
 
-/// A separable blur with a weight: taps along rows and along columns.
+/// A separable blur with a weight.
 struct Blur {
     weight: f64,
     taps: Vec<f64>,
 }
 
-/// All filters at some number of pixels per degree, of one length.
+/// All filters for some number of pixels per degree, padded to the same length.
 pub(super) struct Filters {
     radius: usize,
     blurs: [Vec<Blur>; 3],
@@ -45,13 +46,13 @@ impl Filters {
         let sigma = 0.5 * FEATURE_DEGREES * pixels_per_degree;
         let feature_radius = (REACH * sigma).ceil() as usize;
         let radius = blur_radius.max(feature_radius);
-        let lengthened = |taps: &[f64], from: usize| {
+        let padded = |taps: &[f64], from: usize| {
             let zeros = vec![0.0; radius - from];
             [&zeros, taps, &zeros].concat()
         };
         let blurs = SENSITIVITY.map(|terms| {
             let mut blurs = blurs(terms, blur_radius, pixels_per_degree);
-            blurs.iter_mut().for_each(|blur| blur.taps = lengthened(&blur.taps, blur_radius));
+            blurs.iter_mut().for_each(|blur| blur.taps = padded(&blur.taps, blur_radius));
             blurs
         });
         let bell = gaussian(sigma, feature_radius);
@@ -61,18 +62,18 @@ impl Filters {
         Self {
             radius,
             blurs,
-            smooth: lengthened(&normalised(&bell), feature_radius),
-            edge: lengthened(&balanced(&slope), feature_radius),
-            point: lengthened(&balanced(&curvature), feature_radius),
+            smooth: padded(&normalized(&bell), feature_radius),
+            edge: padded(&balanced(&slope), feature_radius),
+            point: padded(&balanced(&curvature), feature_radius),
         }
     }
 
-    /// Pixels that a filter reaches to each side.
+    /// Radius of the filters in pixels.
     pub(super) fn radius(&self) -> usize {
         self.radius
     }
 
-    /// Blurs the opponent channels as the eye does at this distance.
+    /// Blurs the opponent channels like the eye at this distance.
     pub(super) fn blurred(&self, planes: &[Plane; 3]) -> [Plane; 3] {
         [0, 1, 2].map(|channel| {
             let parts = self.blurs[channel].iter().map(|blur| {
@@ -101,22 +102,22 @@ impl Filters {
     }
 }
 
-/// The Gaussians of one channel, weighted so that all taps of their sum, in two dimensions, have a sum of one.
+/// The Gaussians of a channel, weighted such that the sum of all their 2D taps is 1.
 fn blurs(terms: &[Term], radius: usize, pixels_per_degree: f64) -> Vec<Blur> {
     let volumes = terms.iter().map(|term| {
         // exp(−π²d²/b) with d in degrees.
         let sigma = (term.b / 2.0).sqrt() / PI * pixels_per_degree;
         let taps = gaussian(sigma, radius);
         let sum: f64 = taps.iter().sum();
-        Blur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalised(&taps) }
+        Blur { weight: term.a * (PI / term.b).sqrt() * sum * sum, taps: normalized(&taps) }
     });
     let mut blurs: Vec<_> = volumes.collect();
-    let whole: f64 = blurs.iter().map(|blur| blur.weight).sum();
-    blurs.iter_mut().for_each(|blur| blur.weight /= whole);
+    let total: f64 = blurs.iter().map(|blur| blur.weight).sum();
+    blurs.iter_mut().for_each(|blur| blur.weight /= total);
     blurs
 }
 
-/// Positive taps scaled to a sum of 1, negative ones to −1.
+/// Scales positive taps to a sum of 1 and negative ones to a sum of −1.
 fn balanced(taps: &[f64]) -> Vec<f64> {
     let positive: f64 = taps.iter().filter(|tap| **tap > 0.0).sum();
     let negative: f64 = -taps.iter().filter(|tap| **tap < 0.0).sum::<f64>();

@@ -1,5 +1,5 @@
-//! FLIP: P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images" (2020), for pictures of low dynamic
-//! range, at [`PIXELS_PER_DEGREE`]. Beyond its border, a picture continues with the pixels of its border.
+//! FLIP (P. Andersson et al., *FLIP: A Difference Evaluator for Alternating Images*, 2020) for low dynamic
+//! range images, at [`PIXELS_PER_DEGREE`]. Images are extended by repeating their border pixels.
 
 mod color;
 mod filters;
@@ -13,25 +13,25 @@ use super::{Pair, tiles};
 use crate::film::Rect;
 use crate::math::Vec3;
 
-/// Pixels in a degree of the visual field: a display of 3840 pixels and 0.7 m seen from 0.7 m.
+/// Pixels per degree of the visual field: a display of 3840 pixels and 0.7 m width, viewed from 0.7 m.
 pub const PIXELS_PER_DEGREE: f64 = 67.0;
 
-/// The exponents of the colour and of the feature pipeline.
+/// Exponent of the color pipeline.
 const QC: f64 = 0.7;
-/// Up to this part of the largest colour difference …
+/// Color differences below this fraction of the largest one …
 const PC: f64 = 0.4;
-/// … errors are stretched to this.
+/// … are mapped to errors below this value.
 const PT: f64 = 0.95;
 
-/// The error of every pixel, in [0, 1].
+/// Computes the error of each pixel, in [0, 1].
 pub(super) fn map(pair: &Pair) -> Vec<f32> {
     let (width, height) = (pair.width(), pair.height());
     let filters = Filters::new(PIXELS_PER_DEGREE);
-    let most = libm::pow(color::largest_distance(), QC);
+    let max = libm::pow(color::largest_distance(), QC);
     let mut map = vec![0.0; width * height];
     map.par_chunks_mut(width * tiles::SIDE).enumerate().for_each(|(band, out)| {
         for tile in tiles::of_band(band, width, height) {
-            let errors = tile_errors(pair, tile, &filters, most);
+            let errors = tile_errors(pair, tile, &filters, max);
             let rows = errors.chunks_exact(tile.width as usize);
             for (row, out) in rows.zip(out.chunks_exact_mut(width)) {
                 out[tile.x as usize..][..row.len()].copy_from_slice(row);
@@ -41,15 +41,15 @@ pub(super) fn map(pair: &Pair) -> Vec<f32> {
     map
 }
 
-fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, most: f64) -> Vec<f32> {
-    let [a, b] = [0, 1].map(|which| seen(pair, which, tile, filters));
-    let colors = a.0.iter().zip(&b.0).map(|(a, b)| color_error(a.distance(b), most));
+fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, max: f64) -> Vec<f32> {
+    let [a, b] = [0, 1].map(|which| tile_features(pair, which, tile, filters));
+    let colors = a.0.iter().zip(&b.0).map(|(a, b)| color_error(a.distance(b), max));
     let features = a.1.differences(&b.1);
     colors.zip(features).map(|(color, feature)| libm::pow(color, 1.0 - feature) as f32).collect()
 }
 
-/// Perceived colours and features of a tile, of the picture or of its reference.
-fn seen(pair: &Pair, which: usize, tile: Rect, filters: &Filters) -> (Vec<Perceived>, Features) {
+/// Perceived colors and features of a tile of one image.
+fn tile_features(pair: &Pair, which: usize, tile: Rect, filters: &Filters) -> (Vec<Perceived>, Features) {
     let planes = opponents(pair, which, tile, filters.radius());
     let features = filters.features(&planes[0]);
     let [y, cx, cz] = filters.blurred(&planes);
@@ -58,18 +58,18 @@ fn seen(pair: &Pair, which: usize, tile: Rect, filters: &Filters) -> (Vec<Percei
     (perceived, features)
 }
 
-/// YCxCz of the tile and of a margin around it.
+/// YCxCz of a tile with a margin.
 fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3] {
     let (width, height) = (tile.width as usize + 2 * margin, tile.height as usize + 2 * margin);
     let mut planes = [0; 3].map(|_| Plane::zero(width, height));
-    let place = |start: u32, offset: usize, length: usize| {
+    let position = |start: u32, offset: usize, length: usize| {
         (start as usize + offset).saturating_sub(margin).min(length - 1)
     };
     for row in 0..height {
-        let y = place(tile.y, row, pair.height());
+        let y = position(tile.y, row, pair.height());
         for column in 0..width {
-            let pixel = pair.at(place(tile.x, column, pair.width()), y)[which];
-            let Opponent { y, cx, cz } = Opponent::of(pixel.clamp(Vec3::ZERO, Vec3::ONE).as_dvec3());
+            let pixel = pair.at(position(tile.x, column, pair.width()), y)[which];
+            let Opponent { y, cx, cz } = Opponent::from_linear(pixel.clamp(Vec3::ZERO, Vec3::ONE).as_dvec3());
             for (plane, value) in planes.iter_mut().zip([y, cx, cz]) {
                 plane.values[row * width + column] = value;
             }
@@ -78,9 +78,9 @@ fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3]
     planes
 }
 
-/// Error for a distance of two colours, in [0, 1]: small distances get most of the range.
-fn color_error(distance: f64, most: f64) -> f64 {
+/// Maps a color distance to an error in [0, 1]. Small distances use most of the range.
+fn color_error(distance: f64, max: f64) -> f64 {
     let error = libm::pow(distance, QC);
-    let knee = PC * most;
-    if error < knee { error * PT / knee } else { PT + (error - knee) / (most - knee) * (1.0 - PT) }
+    let knee = PC * max;
+    if error < knee { error * PT / knee } else { PT + (error - knee) / (max - knee) * (1.0 - PT) }
 }

@@ -1,4 +1,4 @@
-//! Errors of parts and checkpoints, each with the way out.
+//! Errors of parts and checkpoints, with advice.
 
 use std::io;
 use std::path::PathBuf;
@@ -7,16 +7,16 @@ use nix::errno::Errno;
 
 use crate::system::describe_error;
 
-/// A part by its number and the number of parts.
+/// Number of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WhichPart {
-    /// From 1.
+    /// Index of the part, from 1.
     pub index: u32,
     /// Number of parts.
     pub count: u32,
 }
 
-/// Reasons for which parts are not merged, or a checkpoint is not gone on from.
+/// Reasons for which parts cannot be merged or a checkpoint cannot be resumed.
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {
     /// The file cannot be read.
@@ -24,42 +24,42 @@ pub enum PartError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// Error of the system.
+        /// System error.
         source: io::Error,
     },
-    /// The file is something else.
-    #[error("{}: this is neither a part nor a checkpoint of glimt", path.display())]
+    /// The file has another format.
+    #[error("{}: not a part or checkpoint written by glimt", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
     },
-    /// Another version of glimt wrote it.
-    #[error("{}: it has version {found} of the format, and this glimt reads version {known}; render it again with this glimt", path.display())]
+    /// The file was written by an incompatible version of glimt.
+    #[error("{}: format version {found} is not supported (expected {known}); render it again with this version of glimt", path.display())]
     Version {
         /// The file.
         path: PathBuf,
-        /// Its version.
+        /// Version of the file.
         found: u32,
-        /// The version that is read.
+        /// The supported version.
         known: u32,
     },
-    /// It ends too early: it is being copied, or the copy was broken off.
-    #[error("{}: it is damaged: it ends at byte {bytes}, before its end; copy or render it again", path.display())]
+    /// The file is truncated: it is still being copied, or copying was interrupted.
+    #[error("{}: it is damaged: truncated at byte {bytes}; copy or render it again", path.display())]
     Unfinished {
         /// The file.
         path: PathBuf,
-        /// Its length.
+        /// Length of the file.
         bytes: u64,
     },
-    /// Its bytes are not those that were written.
+    /// A checksum or the structure of the file is wrong.
     #[error("{}: it is damaged: {why}; copy or render it again", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// The place, in words.
+        /// The fault and its location.
         why: String,
     },
-    /// A checkpoint in the place of a part, or the other way round.
+    /// A checkpoint instead of a part, or vice versa.
     #[error("{}: it is a {found}, not a {wanted}", path.display())]
     Kind {
         /// The file.
@@ -69,61 +69,62 @@ pub enum PartError {
         /// Requested kind.
         wanted: &'static str,
     },
-    /// It is of another picture.
-    #[error("{}: it does not fit {other}: {}", path.display(), differences.join("; "))]
+    /// The file belongs to another image.
+    #[error("{}: it does not match {other}: {}", path.display(), differences.join("; "))]
     Other {
         /// The file.
         path: PathBuf,
-        /// The one that it is compared with.
+        /// The file that it is compared with.
         other: String,
-        /// Differences, a phrase for each.
+        /// Differences, one phrase each.
         differences: Vec<String>,
     },
-    /// Two files are the same part.
-    #[error("{} and {}: both are part {index}/{count}; name it once", first.display(), second.display())]
+    /// Two files contain the same part.
+    #[error("{} and {}: part {index}/{count} is given twice", first.display(), second.display())]
     Doubled {
-        /// One of the files.
+        /// The first file.
         first: PathBuf,
-        /// The other one.
+        /// The second file.
         second: PathBuf,
-        /// Number of the part.
+        /// Index of the part.
         index: u32,
         /// Number of parts.
         count: u32,
     },
-    /// Some parts are not there.
-    #[error("{}; render them with --shard, or join what is there with --partial", missing_parts(missing, *count))]
+    /// Some parts are missing.
+    #[error("{}; render them with --shard, or merge the others with --partial", missing_parts(missing, *count))]
     Missing {
-        /// Their numbers.
+        /// Indices of the missing parts.
         missing: Vec<u32>,
         /// Number of parts.
         count: u32,
     },
-    /// There is no memory for the picture.
+    /// There is not enough memory for the image.
     #[error("{0}")]
     Film(#[from] crate::film::FilmError),
-    /// The work was stopped.
+    /// The operation was cancelled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
 }
 
 impl PartError {
-    /// Whether the process, or the machine, has too many open files: further files would fail for the same reason.
+    /// Whether too many files are open in the process or the system. Opening further files would fail as
+    /// well.
     pub fn is_out_of_files(&self) -> bool {
         let Self::Unreadable { source, .. } = self else { return false };
         matches!(source.raw_os_error().map(Errno::from_raw), Some(Errno::EMFILE | Errno::ENFILE))
     }
 }
 
-/// `2 of 8 parts are missing: 3/8, 4/8`: the names of some of them.
+/// Describes missing parts, for example `2 of 8 parts are missing: 3/8, 4/8`.
 pub fn missing_parts(missing: &[u32], count: u32) -> String {
-    format!("{} of {count} parts are missing: {}", missing.len(), in_a_row(missing, count))
+    format!("{} of {count} parts are missing: {}", missing.len(), part_list(missing, count))
 }
 
-/// `1/8, 3/8, 4/8`: at most some of them.
-fn in_a_row(missing: &[u32], count: u32) -> String {
-    const MOST: usize = 20;
-    let names: Vec<String> = missing.iter().take(MOST).map(|index| format!("{index}/{count}")).collect();
-    let rest = missing.len().saturating_sub(MOST);
+/// Lists parts like `1/8, 3/8, 4/8`, truncated if there are many.
+fn part_list(missing: &[u32], count: u32) -> String {
+    const MAX_SHOWN: usize = 20;
+    let names: Vec<String> = missing.iter().take(MAX_SHOWN).map(|index| format!("{index}/{count}")).collect();
+    let rest = missing.len().saturating_sub(MAX_SHOWN);
     if rest > 0 { format!("{} and {rest} more", names.join(", ")) } else { names.join(", ") }
 }

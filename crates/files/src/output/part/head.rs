@@ -1,43 +1,43 @@
-//! The head of a part: what the picture is, which part of it this is, and how it becomes a file.
+//! Header of a part: the image, the part of it in the file, and the encoding settings.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::super::{BitDepth, Finish};
+use super::super::{BitDepth, DevelopSettings};
 use crate::choice::Choice;
 use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::{ToneMapping, Tonemap, Transfer};
 use crate::film::{Convergence, Film, FilmError, Quantity, Rect, SumOrder};
 
-/// The head of a file.
+/// Header of a part or checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Head {
-    /// Whether it is a part or a checkpoint.
-    pub kind: Kind,
-    /// Everything that the picture depends on, by names that a person knows.
-    pub identity: Vec<Trait>,
-    /// The part of the picture.
+    /// Type of the file.
+    pub kind: PartKind,
+    /// Everything that the image depends on, with user-visible names.
+    pub identity: Vec<Dependency>,
+    /// The contained part of the image.
     pub share: ShareHead,
-    /// The picture.
-    pub picture: PictureHead,
-    /// Path of the scene, relative to the part. Empty if it is unknown. Parts of one picture may differ in it.
+    /// Properties of the image.
+    pub picture: ImageHead,
+    /// Path of the scene relative to the part, which may differ between parts of an image. Empty if unknown.
     #[serde(default)]
     pub scene: String,
 }
 
-/// Kind of a file.
+/// Type of a part file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// A part of a picture, finished.
+pub enum PartKind {
+    /// A finished part of an image.
     Part,
     /// A render that was interrupted or may be extended.
     Checkpoint,
 }
 
-impl Kind {
-    /// Its name.
+impl PartKind {
+    /// Name of the type.
     pub fn name(self) -> &'static str {
         match self {
             Self::Part => "part",
@@ -46,24 +46,24 @@ impl Kind {
     }
 }
 
-/// Something that a picture depends on.
+/// Something that an image depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Trait {
-    /// Its name: a key of the scene, a file.
+pub struct Dependency {
+    /// A scene key or a file name.
     pub name: String,
-    /// Its value, or the fingerprint of a content.
+    /// Value of the key, or hash of the file's content.
     pub value: String,
 }
 
 impl Head {
-    /// Whether a render can have written these numbers.
+    /// Whether the numbers are valid.
     pub(super) fn is_possible(&self) -> bool {
-        /// Most pixels a side, and most parts.
-        const MOST: u32 = 1 << 17;
+        /// Maximum size and maximum number of parts.
+        const LIMIT: u32 = 1 << 17;
         let Self { share, picture, .. } = self;
         let [x, y, width, height] = picture.crop;
-        let is_inside = |at: u32, length: u32, whole: u32| {
-            length > 0 && whole <= MOST && at.checked_add(length).is_some_and(|end| end <= whole)
+        let is_inside = |at: u32, length: u32, total: u32| {
+            length > 0 && total <= LIMIT && at.checked_add(length).is_some_and(|end| end <= total)
         };
         is_inside(x, width, picture.width)
             && is_inside(y, height, picture.height)
@@ -73,53 +73,53 @@ impl Head {
             && picture.tone.exposure.is_finite()
     }
 
-    /// The name of a file that the picture was made of and that has this hash, in hexadecimal digits. `None` if there is none.
+    /// Returns the name of the image's input file with this hash (hexadecimal), if there is one.
     pub(super) fn input_of_hash(&self, hash: &str) -> Option<&str> {
-        let is_it = |one: &&Trait| one.name.starts_with(FILE) && one.value == hash;
-        self.identity.iter().find(is_it).map(|one| name_of(&one.name))
+        let matches = |input: &&Dependency| input.name.starts_with(FILE) && input.value == hash;
+        self.identity.iter().find(matches).map(|input| name_of(&input.name))
     }
 
-    /// The name, as seen from the scene's folder, of a file that the picture was made of or would have been, with which this path
-    /// ends. `None` if there is none.
+    /// Returns the name, relative to the scene's folder, of an input file (even a missing one) that this path
+    /// ends with, if there is one.
     pub(super) fn input_of_name(&self, path: &Path) -> Option<&str> {
-        let files = self.identity.iter().filter(|one| one.name.starts_with(FILE));
-        files.map(|one| name_of(&one.name)).find(|name| !name.is_empty() && path.ends_with(name))
+        let files = self.identity.iter().filter(|input| input.name.starts_with(FILE));
+        files.map(|input| name_of(&input.name)).find(|name| !name.is_empty() && path.ends_with(name))
     }
 }
 
-/// Part of a picture that a file holds.
+/// The part of an image that a file contains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShareHead {
-    /// From 1.
+    /// Index of the part, from 1.
     pub index: u32,
     /// Number of parts.
     pub count: u32,
-    /// Number of blocks of samples in the picture; 0 if parts hold tiles with all their samples.
+    /// Number of sample blocks of the image. 0 if parts contain complete tiles.
     pub block_count: u32,
-    /// Numbers of the blocks that this part holds of its tiles, in their order.
+    /// Indices of the sample blocks that this part contains for each of its tiles, in ascending order.
     pub blocks: Vec<u32>,
 }
 
-/// The picture that a part is of.
+/// Properties of the image that a part belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PictureHead {
-    /// Columns of the whole picture.
+pub struct ImageHead {
+    /// Width of the full image.
     pub width: u32,
-    /// Rows of it.
+    /// Height of the full image.
     pub height: u32,
-    /// Left and top pixel, columns and rows of what is rendered.
+    /// Rendered region: left, top, width and height.
     pub crop: [u32; 4],
-    /// Whether its noise falls as that of photons.
+    /// Whether the noise converges like photon mapping.
     pub is_by_photons: bool,
-    /// Quantity that it shows: `radiance`, `samples` or `error`.
+    /// Displayed quantity: `radiance`, `samples` or `error`.
     pub quantity: String,
     /// Tone mapping.
     pub tone: ToneHead,
-    /// Bits per channel of PNG and PPM files: 8 or 16.
+    /// Bits per channel of PNG and PPM files, 8 or 16.
     pub bit_depth: u8,
-    /// Names and values for the files.
+    /// Metadata names and values of the image file.
     pub metadata: Vec<(String, String)>,
-    /// Whether its numbers are light.
+    /// Whether the values are radiance.
     pub is_light: bool,
 }
 
@@ -130,29 +130,30 @@ pub struct ToneHead {
     pub exposure: f32,
     /// Name of the curve.
     pub curve: String,
-    /// Whether numbers are display values already.
+    /// Whether the values are display values already.
     pub is_data: bool,
-    /// Stretch to the range in view: `distances`, `amounts` or none.
+    /// Range mapping: `distances`, `amounts` or none.
     pub stretch: Option<String>,
 }
 
-/// The words for quantities.
+/// Names of the quantities.
 const QUANTITIES: [(Quantity, &str); 3] =
     [(Quantity::Radiance, "radiance"), (Quantity::Samples, "samples"), (Quantity::Error, "error")];
 
-/// The words for kinds of stretches.
+/// Names of the range mappings.
 const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
-impl PictureHead {
-    /// The head of a film's picture that is finished so.
-    pub fn new(film: &Film, finish: &Finish) -> Self {
+impl ImageHead {
+    /// Describes the image of a film with these settings.
+    pub fn new(film: &Film, finish: &DevelopSettings) -> Self {
         let Rect { x, y, width, height } = film.crop();
         let tone = &finish.tone;
         let kind = match tone.range_map {
             RangeMap::None => None,
             RangeMap::Unresolved(kind) | RangeMap::Resolved(kind, _) => Some(kind),
         };
-        let word = |of: DataKind| STRETCHES.iter().find(|(kind, _)| *kind == of).map(|(_, word)| *word);
+        let word =
+            |wanted: DataKind| STRETCHES.iter().find(|(kind, _)| *kind == wanted).map(|(_, word)| *word);
         let quantity = QUANTITIES.iter().find(|(quantity, _)| *quantity == finish.quantity);
         Self {
             width: film.width(),
@@ -175,13 +176,13 @@ impl PictureHead {
         }
     }
 
-    /// The settings that turn the film into a file. `None` if a word in it has no meaning.
-    pub fn finish(&self) -> Option<Finish> {
+    /// Settings that determine the image file. `None` if a name is unknown.
+    pub fn finish(&self) -> Option<DevelopSettings> {
         let range_map = match self.tone.stretch.as_deref() {
             None => RangeMap::None,
             Some(word) => RangeMap::Unresolved(STRETCHES.iter().find(|(_, known)| *known == word)?.0),
         };
-        Some(Finish {
+        Some(DevelopSettings {
             quantity: QUANTITIES.iter().find(|(_, word)| *word == self.quantity)?.0,
             tone: ToneMapping {
                 exposure_stops: self.tone.exposure,
@@ -195,10 +196,10 @@ impl PictureHead {
         })
     }
 
-    /// An empty film for the picture.
+    /// Creates an empty film for the image.
     ///
     /// # Errors
-    /// There is no memory for it.
+    /// There is not enough memory.
     pub fn film(&self) -> Result<Film, FilmError> {
         let [x, y, width, height] = self.crop;
         let film = Film::new(self.width, self.height, Some(Rect { x, y, width, height }))?;
@@ -209,43 +210,42 @@ impl PictureHead {
     }
 }
 
-/// Differences between two identities, a phrase for each; `here` and `there` name the two.
-pub fn differences(own: &[Trait], other: &[Trait], (here, there): (&str, &str)) -> Vec<String> {
-    let value_of =
-        |all: &[Trait], name: &str| all.iter().find(|one| one.name == name).map(|one| one.value.clone());
-    let shown = |value: Option<String>| value.unwrap_or_else(|| "not there".to_owned());
-    let mut names: Vec<&str> = own.iter().map(|one| one.name.as_str()).collect();
-    names.extend(other.iter().map(|one| one.name.as_str()).filter(|name| value_of(own, name).is_none()));
-    let differing = names.into_iter().filter(|name| value_of(own, name) != value_of(other, name));
+/// Differences between two lists of inputs, one phrase each. `here` and `there` name the two sides.
+pub fn differences(a: &[Dependency], b: &[Dependency], (here, there): (&str, &str)) -> Vec<String> {
+    let value_of = |all: &[Dependency], name: &str| {
+        all.iter().find(|input| input.name == name).map(|input| input.value.clone())
+    };
+    let shown = |value: Option<String>| value.unwrap_or_else(|| "missing".to_owned());
+    let mut names: Vec<&str> = a.iter().map(|input| input.name.as_str()).collect();
+    names.extend(b.iter().map(|input| input.name.as_str()).filter(|name| value_of(a, name).is_none()));
+    let differing = names.into_iter().filter(|name| value_of(a, name) != value_of(b, name));
     let differing: Vec<&str> = differing.collect();
     let is_named = differing.iter().any(|name| !is_content(name));
     differing
         .iter()
-        // The sum of everything says something only where nothing else does.
+        // The total hash is only informative if nothing else differs.
         .filter(|name| **name != EVERYTHING || differing.len() == 1)
         .filter(|name| !is_named || **name != EVERYTHING)
-        .map(|name| match (value_of(own, name), value_of(other, name)) {
-            _ if *name == EVERYTHING => {
-                "the scene's shapes, materials, lights or camera are others".to_owned()
+        .map(|name| match (value_of(a, name), value_of(b, name)) {
+            _ if *name == EVERYTHING => "the scene's shapes, materials, lights or camera differ".to_owned(),
+            (Some(_), Some(_)) if is_content(name) => format!("{} has different content", name_of(name)),
+            (a, b) if is_content(name) => {
+                let place = if a.is_some() { here } else { there };
+                debug_assert!(a.is_some() != b.is_some());
+                format!("{} is only used {place}", name_of(name))
             }
-            (Some(_), Some(_)) if is_content(name) => format!("{} has another content", name_of(name)),
-            (own, other) if is_content(name) => {
-                let place = if own.is_some() { here } else { there };
-                debug_assert!(own.is_some() != other.is_some());
-                format!("{} is used {place} only", name_of(name))
+            (Some(a), Some(b)) if *name == PROGRAM => {
+                format!("glimt {a} rendered it {here} and glimt {b} {there}; use the same build")
             }
-            (Some(own), Some(other)) if *name == PROGRAM => {
-                format!("glimt {own} rendered it {here} and glimt {other} {there}; use the same build")
-            }
-            (own, other) => format!("{name} is {} {here} and {} {there}", shown(own), shown(other)),
+            (a, b) => format!("{name} is {} {here} and {} {there}", shown(a), shown(b)),
         })
         .collect()
 }
 
-/// Name of the trait that is the program's version and build.
+/// Name of the input that is the program's version and build.
 const PROGRAM: &str = "glimt";
 
-/// Name of the trait that stands for all others.
+/// Name of the input that is the hash of all inputs.
 pub(super) const EVERYTHING: &str = "everything";
 
 fn is_content(name: &str) -> bool {
@@ -256,21 +256,21 @@ fn name_of(name: &str) -> &str {
     name.strip_prefix(FILE).unwrap_or(name)
 }
 
-/// Before the names of files, whose values are fingerprints.
+/// Prefix of the names of files, whose values are hashes.
 const FILE: &str = "file ";
 
-impl Trait {
-    /// A setting.
+impl Dependency {
+    /// A setting as an input.
     pub fn setting(name: &str, value: impl Into<String>) -> Self {
         Self { name: name.to_owned(), value: value.into() }
     }
 
-    /// A file, by its name and the fingerprint of its content.
+    /// A file as an input, with the hash of its content.
     pub fn file(name: &str, content: impl Into<String>) -> Self {
         Self { name: format!("{FILE}{name}"), value: content.into() }
     }
 
-    /// The fingerprint of all that the picture depends on.
+    /// The hash of everything that the image depends on.
     pub fn everything(key: impl Into<String>) -> Self {
         Self { name: EVERYTHING.to_owned(), value: key.into() }
     }

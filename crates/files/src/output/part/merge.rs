@@ -1,36 +1,36 @@
-//! Joining parts: tile after tile, so that the picture and one tile of each part are in memory.
+//! Merges parts tile by tile, so that only the image and one tile of each part are in memory.
 
 use std::collections::BTreeMap;
 
-use super::head::{Head, Kind, differences};
+use super::head::{Head, PartKind, differences};
 use super::{PartError, PartFile};
 use crate::control::CancelToken;
 use crate::film::{Film, StoredTile};
 
-/// Parts that were joined.
+/// The result of merging parts.
 #[derive(Debug)]
 pub struct Merged {
-    /// The sums of all parts.
+    /// Sum of all parts.
     pub film: Film,
-    /// Numbers of the parts that are not there.
+    /// Indices of the missing parts.
     pub missing: Vec<u32>,
     /// Number of parts.
     pub count: u32,
 }
 
-/// Checks that parts belong together; returns the numbers of the missing parts.
+/// Checks that parts belong together. Returns the indices of the missing parts.
 ///
 /// # Errors
-/// The first that is something else, is of another picture, or is there twice.
+/// The first file that is not a part, belongs to another image, or is given twice.
 pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let mut found = BTreeMap::new();
     for part in parts {
-        part.check_kind(Kind::Part)?;
+        part.check_kind(PartKind::Part)?;
         let name = first.path.display().to_string();
-        let unlike = unlike(&part.head, &first.head);
-        if !unlike.is_empty() {
-            return Err(PartError::Other { path: part.path.clone(), other: name, differences: unlike });
+        let differences = head_differences(&part.head, &first.head);
+        if !differences.is_empty() {
+            return Err(PartError::Other { path: part.path.clone(), other: name, differences });
         }
         let (index, count) = (part.head.share.index, part.head.share.count);
         if let Some(twin) = found.insert(index, part) {
@@ -42,29 +42,29 @@ pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     Ok((1..=count).filter(|index| !found.contains_key(index)).collect())
 }
 
-/// Differences between the pictures of two heads, or between their cuts of one picture.
-fn unlike(own: &Head, other: &Head) -> Vec<String> {
-    let mut unlike = differences(&own.identity, &other.identity, ("here", "there"));
-    let counts = (own.share.count, other.share.count);
+/// Differences between the images of two headers, or in how they are split.
+fn head_differences(a: &Head, b: &Head) -> Vec<String> {
+    let mut found = differences(&a.identity, &b.identity, ("here", "there"));
+    let counts = (a.share.count, b.share.count);
     if counts.0 != counts.1 {
-        unlike.push(format!("it is one of {} parts here and of {} there", counts.0, counts.1));
+        found.push(format!("it is one of {} parts here and of {} there", counts.0, counts.1));
     }
-    let (picture, there) = (&own.picture, &other.picture);
-    if unlike.is_empty() {
-        unlike.extend(metadata_differences(&picture.metadata, &there.metadata));
+    let (picture, there) = (&a.picture, &b.picture);
+    if found.is_empty() {
+        found.extend(metadata_differences(&picture.metadata, &there.metadata));
     }
-    if unlike.is_empty() && (picture != there || own.share.block_count != other.share.block_count) {
-        unlike.push("the image is finished in another way".to_owned());
+    if found.is_empty() && (picture != there || a.share.block_count != b.share.block_count) {
+        found.push("the output settings differ".to_owned());
     }
-    unlike
+    found
 }
 
-/// Differences between the names and values that two images get, a phrase for each.
-fn metadata_differences(own: &[(String, String)], other: &[(String, String)]) -> Vec<String> {
+/// Differences between the metadata of two images, one phrase each.
+fn metadata_differences(a: &[(String, String)], b: &[(String, String)]) -> Vec<String> {
     let value = |all: &[(String, String)], name: &str| all.iter().find(|(known, _)| known == name).cloned();
-    let names = own.iter().chain(other.iter().filter(|(name, _)| value(own, name).is_none()));
+    let names = a.iter().chain(b.iter().filter(|(name, _)| value(a, name).is_none()));
     let words = |(name, _): &(String, String)| {
-        let [here, there] = [own, other].map(|all| value(all, name).map(|(_, value)| value));
+        let [here, there] = [a, b].map(|all| value(all, name).map(|(_, value)| value));
         let shown = |value: Option<String>| value.unwrap_or_else(|| "missing".to_owned());
         let label = name.strip_prefix("glimt:").unwrap_or(name);
         (here != there).then(|| format!("its {label} is {} here and {} there", shown(here), shown(there)))
@@ -72,11 +72,11 @@ fn metadata_differences(own: &[(String, String)], other: &[(String, String)]) ->
     names.filter_map(words).collect()
 }
 
-/// Joins parts, whatever their order. If some are missing, `is_partial` joins the others: what is missing stays black, or has fewer
-/// samples. `tell` hears how many of all tiles are done, and may look at the film.
+/// Merges parts in any order. If some are missing and `is_partial`, merges the others; the missing tiles stay
+/// black or have fewer samples. `tell` is called with the number of finished tiles and the film.
 ///
 /// # Errors
-/// As [`check`]; parts are missing; a part does not hold what its number says; cancelled.
+/// The errors of [`check`]; parts are missing; a part is inconsistent; cancelled.
 pub fn merge(
     parts: &[PartFile],
     is_partial: bool,
@@ -94,8 +94,8 @@ pub fn merge(
         token.check()?;
         let area = film.tile_rect(tile).map_or(0, |rect| rect.area());
         let stored = match first.head.share.block_count {
-            0 => whole(parts, tile, area)?,
-            blocks => by_blocks(parts, blocks, tile, area)?,
+            0 => unsplit_tile(parts, tile, area)?,
+            blocks => sum_blocks(parts, blocks, tile, area)?,
         };
         let is_complete = stored.as_ref().is_some_and(|(_, is_complete)| *is_complete);
         if missing.is_empty() && !is_complete {
@@ -103,7 +103,7 @@ pub fn merge(
             return Err(PartError::Damaged { path: first.path.clone(), why });
         }
         if let Some((stored, _)) = stored {
-            let why = format!("tile {tile} is none of this picture");
+            let why = format!("tile {tile} does not belong to this image");
             let damaged = |_| PartError::Damaged { path: first.path.clone(), why };
             film.restore(tile, stored).map_err(damaged)?;
         }
@@ -113,13 +113,17 @@ pub fn merge(
     Ok(Merged { film, missing, count })
 }
 
-/// A tile that one part has, and whether it has all its samples.
-fn whole(parts: &[PartFile], tile: usize, area: usize) -> Result<Option<(StoredTile, bool)>, PartError> {
+/// Returns a tile that a single part contains, and whether it has all samples.
+fn unsplit_tile(
+    parts: &[PartFile],
+    tile: usize,
+    area: usize,
+) -> Result<Option<(StoredTile, bool)>, PartError> {
     let mut found: Option<(StoredTile, &PartFile)> = None;
     for part in parts {
         let Some(stored) = part.tile(tile, area)? else { continue };
         if let Some((_, twin)) = &found {
-            let why = format!("it holds tile {tile}, as does {}", twin.path.display());
+            let why = format!("it contains tile {tile}, as does {}", twin.path.display());
             return Err(PartError::Damaged { path: part.path.clone(), why });
         }
         found = Some((stored, part));
@@ -127,8 +131,8 @@ fn whole(parts: &[PartFile], tile: usize, area: usize) -> Result<Option<(StoredT
     Ok(found.map(|(stored, _)| (stored, true)))
 }
 
-/// The sum of the blocks of a tile in their order, and whether they are all there.
-fn by_blocks(
+/// Returns the sum of a tile's blocks, in ascending order, and whether it is complete.
+fn sum_blocks(
     parts: &[PartFile],
     block_count: u32,
     tile: usize,
@@ -141,16 +145,19 @@ fn by_blocks(
             tiles.push((part, stored));
         }
     }
-    // Find out which part has each block.
+    // Map each block to its part.
     let mut order: BTreeMap<u32, (usize, usize)> = BTreeMap::new();
     for (index, (part, _)) in tiles.iter().enumerate() {
-        for (place, block) in part.head.share.blocks.iter().enumerate() {
+        for (position, block) in part.head.share.blocks.iter().enumerate() {
             if *block >= block_count {
-                return Err(damaged(part, format!("it holds block {block} of {block_count}")));
+                return Err(damaged(
+                    part,
+                    format!("it contains block {block}, but there are only {block_count}"),
+                ));
             }
-            if let Some((twin, _)) = order.insert(*block, (index, place)) {
+            if let Some((twin, _)) = order.insert(*block, (index, position)) {
                 let why = format!(
-                    "it holds block {block} of tile {tile}, as does {}",
+                    "it contains block {block} of tile {tile}, as does {}",
                     tiles[twin].0.path.display()
                 );
                 return Err(damaged(part, why));
@@ -160,11 +167,11 @@ fn by_blocks(
     if order.is_empty() {
         return Ok(None);
     }
-    // Add them up by their numbers.
+    // Sum the blocks in ascending order.
     let mut sum = StoredTile::default();
-    for (index, place) in order.values() {
+    for (index, position) in order.values() {
         let (part, stored) = &tiles[*index];
-        let added = sum.add_block(stored, *place);
+        let added = sum.add_block(stored, *position);
         added.map_err(|_| damaged(part, format!("a block of tile {tile} is missing")))?;
     }
     tiles.iter().for_each(|(_, stored)| sum.add_counts(stored));

@@ -1,17 +1,17 @@
-//! Parts of a picture, and checkpoints: a film as a file, with the names of all that it is of.
+//! Parts of an image and checkpoints: a film stored in a file, with everything that the image depends on.
 //!
 //! | bytes | |
 //! | --- | --- |
-//! | 12 | the mark, which no picture begins with |
-//! | 4 | the version of this format |
-//! | 4, n | the length of the head, and the head: [`Head`] as JSON |
-//! | 16 | the digest of all before |
-//! | 4, 4, n, 16 | for each tile that has samples: its number, the length of its bytes, its bytes, a digest |
-//! | 4, 4, n, 16 | the end in the same form, with a number that no tile has: counts, the digest of all records, the state of the render |
+//! | 12 | magic number, which no image format uses |
+//! | 4 | format version |
+//! | 4, n | length of the header, and the header: [`Head`] as JSON |
+//! | 16 | digest of everything before |
+//! | 4, 4, n, 16 | for each tile with samples: index, length, data, digest |
+//! | 4, 4, n, 16 | the footer in the same form, with an index that no tile has: counts, digest of all records, render state |
 //!
-//! All numbers are little-endian. Each digest (BLAKE3, of which 16 bytes are kept) is of that of the head and of its own record, so
-//! that no record passes for one of another file. The end holds the digest of all records: nothing can be missing before it, and
-//! nothing may follow.
+//! All numbers are little-endian. Digests are the first 16 bytes of BLAKE3. The digest of a record includes
+//! that of the header, so that records cannot be mixed between files. The footer contains a digest of all
+//! records: no record can be missing, and nothing may follow.
 
 mod error;
 mod head;
@@ -20,27 +20,27 @@ mod read;
 mod save;
 
 pub use error::{PartError, WhichPart, missing_parts};
-pub use head::{Head, Kind, PictureHead, ShareHead, ToneHead, Trait, differences};
+pub use head::{Dependency, Head, ImageHead, PartKind, ShareHead, ToneHead, differences};
 pub use merge::{Merged, check, merge};
-pub use read::{PartFile, input_in_place_of, input_of_that_name, is_part};
+pub use read::{PartFile, input_with_content, input_with_name, is_part};
 pub use save::save;
 
-/// The first bytes of a file. Like those of PNG, they are changed by whatever takes the file for a text.
+/// Magic number. Like that of PNG, it is corrupted by conversions of text files.
 const MARK: [u8; 12] = crate::system::file::PART_MARK;
 
 /// Version of the format.
 const VERSION: u32 = 1;
 
-/// Number in the place of a tile's for the end.
-const END: u32 = u32::MAX;
+/// Index of the footer record.
+const FOOTER: u32 = u32::MAX;
 
-/// Digest of a record, or of the head.
+/// Digest of a record or of the header.
 type Digest = [u8; 16];
 
-/// The digest of some bytes of a file whose head has a digest.
-fn digest(of_head: &Digest, parts: &[&[u8]]) -> Digest {
+/// Digest of some bytes of a file, given the digest of its header.
+fn digest(header_digest: &Digest, parts: &[&[u8]]) -> Digest {
     let mut hasher = blake3::Hasher::new();
-    hasher.update(of_head);
+    hasher.update(header_digest);
     for part in parts {
         hasher.update(part);
     }
@@ -49,16 +49,16 @@ fn digest(of_head: &Digest, parts: &[&[u8]]) -> Digest {
     digest
 }
 
-/// The end of a file.
+/// Footer of a file.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-struct End {
+struct Footer {
     /// Number of tiles.
     tiles: u64,
-    /// Samples that were not finite.
+    /// Number of nonfinite samples.
     non_finite: u64,
-    /// Digest of the tiles' digests, in hexadecimal digits.
+    /// Digest of the tiles' digests, in hexadecimal.
     records: String,
-    /// State of the render that made it; of no meaning here.
+    /// State of the render, opaque to this module.
     state: serde_json::Value,
 }
 

@@ -5,14 +5,14 @@ use proptest::prelude::*;
 use serde_json::json;
 
 use super::super::write::{Durability, Guard};
-use super::super::{BitDepth, Finish, Losses};
+use super::super::{BitDepth, DevelopSettings, Losses};
 use super::*;
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
 use crate::film::{Film, Quantity, TileSamples};
 use crate::math::Vec3;
 
-/// A film of 70 × 40 pixels, six tiles, with samples in those that belong to a part.
+/// A film of 70 × 40 pixels and six tiles, with samples in the tiles of one part.
 fn film(index: u32, count: u32) -> Film {
     let film = Film::new(70, 40, None).expect("a film");
     for tile in (0..film.tile_count()).filter(|tile| *tile as u32 % count == index - 1) {
@@ -23,8 +23,8 @@ fn film(index: u32, count: u32) -> Film {
     film
 }
 
-fn finish() -> Finish {
-    Finish {
+fn finish() -> DevelopSettings {
+    DevelopSettings {
         quantity: Quantity::Radiance,
         tone: ToneMapping { exposure_stops: 0.3, ..ToneMapping::default() },
         bit_depth: BitDepth::Sixteen,
@@ -35,16 +35,20 @@ fn finish() -> Finish {
 
 fn head(index: u32, count: u32, film: &Film) -> Head {
     Head {
-        kind: Kind::Part,
-        identity: vec![Trait::setting("seed", "7"), Trait::file("knot.obj", "12ab"), Trait::everything("ff")],
+        kind: PartKind::Part,
+        identity: vec![
+            Dependency::setting("seed", "7"),
+            Dependency::file("knot.obj", "12ab"),
+            Dependency::everything("ff"),
+        ],
         share: ShareHead { index, count, block_count: 0, blocks: Vec::new() },
-        picture: PictureHead::new(film, &finish()),
+        picture: ImageHead::new(film, &finish()),
         scene: String::new(),
     }
 }
 
 const OPEN: Guard<'static> =
-    Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses: Losses::Refused };
+    Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), sweep: None, losses: Losses::Refuse };
 
 fn put(folder: &Path, name: &str, head: &Head, film: &Film) -> PathBuf {
     let path = folder.join(name);
@@ -57,7 +61,7 @@ fn opened(path: &Path) -> Result<PartFile, PartError> {
     PartFile::open(path, &CancelToken::new())
 }
 
-/// The parts of a picture in a folder.
+/// Writes all parts of an image to a folder.
 fn parts(folder: &Path, count: u32) -> Vec<PathBuf> {
     let part = |index| {
         let film = film(index, count);
@@ -72,7 +76,7 @@ fn merged(paths: &[PathBuf]) -> Result<Merged, PartError> {
 }
 
 #[test]
-fn parts_in_any_order_are_the_whole() {
+fn parts_merge_in_any_order() {
     let folder = tempfile::tempdir().expect("a folder");
     let whole = film(1, 1);
     for count in [1, 2, 4, 9] {
@@ -88,43 +92,50 @@ fn parts_in_any_order_are_the_whole() {
 }
 
 #[test]
-fn what_does_not_belong_together_is_named() {
+fn parts_that_do_not_match_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let paths = parts(folder.path(), 3);
-    let said = |paths: &[PathBuf]| merged(paths).expect_err("refused").to_string();
-    let lacking = said(&paths[..2]);
-    assert!(lacking.starts_with("1 of 3 parts are missing: 3/3;"), "{lacking}");
-    let doubled = said(&[&paths[..], &paths[1..2]].concat());
-    assert!(doubled.contains("both are part 2/3"), "{doubled}");
-    // Another seed, another mesh, another scene, another number of parts.
+    let error = |paths: &[PathBuf]| merged(paths).expect_err("rejected");
+    let incomplete = error(&paths[..2]);
+    assert!(
+        matches!(&incomplete, PartError::Missing { missing, count: 3 } if missing == &[3]),
+        "{incomplete}"
+    );
+    let doubled = error(&[&paths[..], &paths[1..2]].concat());
+    assert!(matches!(doubled, PartError::Doubled { index: 2, count: 3, .. }), "{doubled}");
+    // Change the seed, a mesh, the scene, the number of parts, the output settings and the type.
     let film = film(2, 3);
     let other = |change: &dyn Fn(&mut Head)| {
         let mut head = head(2, 3, &film);
         change(&mut head);
         let path = put(folder.path(), "other.part", &head, &film);
-        said(&[paths[0].clone(), path, paths[2].clone()])
+        error(&[paths[0].clone(), path, paths[2].clone()])
     };
+    type HeadEdit<'a> = &'a dyn Fn(&mut Head);
     for (change, words) in [
-        (
-            &(|head: &mut Head| head.identity[0].value = "8".into()) as &dyn Fn(&mut Head),
-            "seed is 8 here and 7 there",
-        ),
-        (&|head: &mut Head| head.identity[1].value = "cd".into(), "knot.obj has another content"),
-        (&|head: &mut Head| head.identity[2].value = "00".into(), "shapes, materials, lights or camera"),
-        (&|head: &mut Head| head.share.count = 4, "one of 4 parts here and of 3 there"),
-        (&|head: &mut Head| head.picture.bit_depth = 8, "finished in another way"),
-        (&|head: &mut Head| head.kind = Kind::Checkpoint, "it is a checkpoint, not a part"),
+        (&(|head: &mut Head| head.identity[0].value = "8".into()) as HeadEdit<'_>, &["seed", "8", "7"][..]),
+        (&|head: &mut Head| head.identity[1].value = "cd".into(), &["knot.obj"]),
+        (&|head: &mut Head| head.identity[2].value = "00".into(), &["materials"]),
+        (&|head: &mut Head| head.share.count = 4, &["4", "3"]),
+        (&|head: &mut Head| head.picture.bit_depth = 8, &["settings"]),
     ] {
-        let said = other(change);
-        assert!(said.contains("other.part: ") && said.contains(words), "{said}");
+        let PartError::Other { path, differences, .. } = other(change) else { panic!("{words:?}") };
+        assert!(path.ends_with("other.part") && differences.len() == 1, "{differences:?}");
+        assert!(words.iter().all(|word| differences[0].contains(word)), "{differences:?}");
     }
-    // A part that says to be another one has tiles of its neighbour.
+    let checkpoint = other(&|head: &mut Head| head.kind = PartKind::Checkpoint);
+    assert!(
+        matches!(checkpoint, PartError::Kind { found: "checkpoint", wanted: "part", .. }),
+        "{checkpoint}"
+    );
+    // A part with another index contains the tiles of its neighbor.
     let stolen = put(folder.path(), "3.part", &head(3, 3, &film), &film);
-    assert!(said(&[paths[0].clone(), paths[1].clone(), stolen]).contains("as does"));
+    let stolen = error(&[paths[0].clone(), paths[1].clone(), stolen]);
+    assert!(matches!(stolen, PartError::Damaged { .. }), "{stolen}");
 }
 
 #[test]
-fn other_files_are_told_from_parts() {
+fn foreign_and_damaged_files_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = parts(folder.path(), 1).remove(0);
     assert!(is_part(&path));
@@ -134,7 +145,7 @@ fn other_files_are_told_from_parts() {
         change(&mut bytes);
         let other = folder.path().join("other");
         fs::write(&other, bytes).expect("written");
-        opened(&other).expect_err("refused")
+        opened(&other).expect_err("rejected")
     };
     assert!(matches!(with(&|bytes| bytes[0] = 0), PartError::Foreign { .. }));
     for length in [0, 5, 12, 15, 20, bytes.len() / 2, bytes.len() - 1] {
@@ -151,7 +162,7 @@ fn other_files_are_told_from_parts() {
 }
 
 #[test]
-fn heads_with_impossible_numbers_are_damaged() {
+fn impossible_headers_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let film = film(1, 2);
     let right = head(1, 2, &film);
@@ -171,29 +182,30 @@ fn heads_with_impossible_numbers_are_damaged() {
         let mut head = right.clone();
         change(&mut head);
         let path = put(folder.path(), "wrong", &head, &film);
+        let result = opened(&path);
         assert!(
-            matches!(opened(&path), Err(PartError::Damaged { why, .. }) if why.contains("impossible")),
-            "{number}"
+            matches!(&result, Err(PartError::Damaged { why, .. }) if why == read::IMPOSSIBLE_HEADER),
+            "{number}: {result:?}"
         );
     }
 }
 
 #[test]
-fn too_many_open_files_are_told_from_other_errors() {
-    let of = |number| PartError::Unreadable {
+fn too_many_open_files_are_detected() {
+    let unreadable = |number| PartError::Unreadable {
         path: "a".into(),
         source: std::io::Error::from_raw_os_error(number),
     };
     use nix::errno::Errno;
     for number in [Errno::EMFILE, Errno::ENFILE] {
-        assert!(of(number as i32).is_out_of_files(), "{number}");
+        assert!(unreadable(number as i32).is_out_of_files(), "{number}");
     }
-    assert!(!of(Errno::ENOENT as i32).is_out_of_files());
+    assert!(!unreadable(Errno::ENOENT as i32).is_out_of_files());
     assert!(!PartError::Foreign { path: "a".into() }.is_out_of_files());
 }
 
 #[test]
-fn what_two_images_say_of_themselves_is_named() {
+fn metadata_differences_are_listed() {
     let folder = tempfile::tempdir().expect("a folder");
     let part = |index, scene: &str| {
         let film = film(index, 2);
@@ -202,40 +214,40 @@ fn what_two_images_say_of_themselves_is_named() {
         opened(&put(folder.path(), scene, &head, &film)).expect("a part")
     };
     let parts = [part(1, "a.toml"), part(2, "b.toml")];
-    let said = merge::check(&parts).expect_err("two scenes").to_string();
-    assert!(said.contains("its scene is b.toml here and a.toml there"), "{said}");
+    let PartError::Other { differences, .. } = merge::check(&parts).expect_err("two scenes") else {
+        panic!("the scenes differ")
+    };
+    assert!(differences[0].contains("b.toml") && differences[0].contains("a.toml"), "{differences:?}");
 }
 
 #[test]
-fn parts_of_two_builds_do_not_fit() {
-    let of = |build: &str| vec![Trait::setting("glimt", build), Trait::setting("width", "4")];
-    let [one, other] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(of);
-    assert_eq!(differences(&one, &one, ("here", "there")), [""; 0]);
-    assert_eq!(
-        differences(&one, &other, ("here", "there")),
-        ["glimt 0.1.0 (build 1) rendered it here and glimt 0.1.0 (build 2) there; use the same build"]
-    );
+fn parts_of_different_builds_do_not_match() {
+    let inputs = |build: &str| vec![Dependency::setting("glimt", build), Dependency::setting("width", "4")];
+    let [a, b] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(inputs);
+    assert_eq!(differences(&a, &a, ("here", "there")), [""; 0]);
+    let found = differences(&a, &b, ("here", "there"));
+    assert!(found.len() == 1 && found[0].contains("build 1") && found[0].contains("build 2"), "{found:?}");
 }
 
-/// Whole records may not be left out or changed for those of another file either.
+/// Records cannot be removed or replaced by those of another file.
 #[test]
-fn records_are_bound_to_their_file() {
+fn records_cannot_be_removed() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = parts(folder.path(), 2).remove(0);
     let part = opened(&path).expect("a part");
     let bytes = fs::read(&path).expect("a part");
-    let (_, place, length) = part.tiles[1];
-    let record = place as usize - 8..place as usize + length as usize + 16;
+    let (_, offset, length) = part.tiles[1];
+    let record = offset as usize - 8..offset as usize + length as usize + 16;
     let without = [&bytes[..record.start], &bytes[record.end..]].concat();
     fs::write(&path, without).expect("written");
-    assert!(matches!(opened(&path), Err(PartError::Damaged { why, .. }) if why.contains("missing")));
+    assert!(matches!(opened(&path), Err(PartError::Damaged { .. })));
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
     #[test]
-    fn a_flipped_bit_or_a_cut_is_found(place in 0.0..1.0_f64, bit in 0_u8..8, cuts in any::<bool>()) {
+    fn flipped_bits_and_truncations_are_detected(place in 0.0..1.0_f64, bit in 0_u8..8, cuts in any::<bool>()) {
         let folder = tempfile::tempdir().expect("a folder");
         let path = parts(folder.path(), 6).remove(0);
         let mut bytes = fs::read(&path).expect("a part");

@@ -1,26 +1,26 @@
-//! GIF: comments before the first frame, and the number of frames. The decoders that there are skip comments.
+//! Reads GIF comments before the first frame and counts the frames. Existing decoders skip comments.
 
 use std::io::Read;
 
-use super::Made;
+use super::ImageInfo;
 
-/// Blocks of a GIF by their first bytes.
+/// Block types.
 const EXTENSION: u8 = 0x21;
 const FRAME: u8 = 0x2c;
 const END: u8 = 0x3b;
-/// The kind of an extension that is a comment.
+/// Label of a comment extension.
 const COMMENT: u8 = 0xfe;
-/// The flag of a palette, for all frames or for one.
+/// Flag of a global or local palette.
 const HAS_PALETTE: u8 = 0x80;
 
-/// A GIF by its blocks, from its start. The frames of a file that is cut short are not counted. `None` if it has no frame.
-pub(super) fn of_gif(mut file: impl Read) -> Option<Made> {
+/// Reads a GIF from its start. Frames of a truncated file are not counted. `None` if there are no frames.
+pub(super) fn read_gif(mut file: impl Read) -> Option<ImageInfo> {
     let [_, _, _, _, _, _, a, b, c, d, flags, _, _] = next(&mut file)?;
     let size = (u32::from(u16::from_le_bytes([a, b])), u32::from(u16::from_le_bytes([c, d])));
-    let mut made = Made { format: "GIF".to_owned(), size: Some(size), ..Made::default() };
+    let mut info = ImageInfo { format: "GIF".to_owned(), size: Some(size), ..ImageInfo::default() };
     skip_palette(&mut file, flags)?;
     let mut frames = 0;
-    let is_whole = loop {
+    let is_complete = loop {
         match next(&mut file) {
             Some([EXTENSION]) => {
                 let Some([kind]) = next(&mut file) else { break false };
@@ -29,7 +29,7 @@ pub(super) fn of_gif(mut file: impl Read) -> Option<Made> {
                 if sub_blocks(&mut file, keep).is_none() {
                     break false;
                 }
-                String::from_utf8_lossy(&comment).lines().for_each(|line| made.add_line(line));
+                String::from_utf8_lossy(&comment).lines().for_each(|line| info.add_line(line));
             }
             Some([FRAME]) => {
                 frames += 1;
@@ -41,11 +41,11 @@ pub(super) fn of_gif(mut file: impl Read) -> Option<Made> {
             Some(_) | None => break false,
         }
     };
-    made.frames = is_whole.then_some(frames);
-    (frames > 0).then_some(made)
+    info.frames = is_complete.then_some(frames);
+    (frames > 0).then_some(info)
 }
 
-/// The next bytes.
+/// Reads the next `N` bytes.
 fn next<const N: usize>(file: &mut impl Read) -> Option<[u8; N]> {
     let mut bytes = [0; N];
     file.read_exact(&mut bytes).ok().map(|()| bytes)
@@ -56,7 +56,7 @@ fn skip_palette(file: &mut impl Read, flags: u8) -> Option<()> {
     (0..colors).try_for_each(|_| next::<3>(file).map(|_| ()))
 }
 
-/// Skips a frame: its place and size, its palette, the width of its codes, its pixels.
+/// Skips a frame: position and size, palette, code size, pixels.
 fn skip_frame(file: &mut impl Read) -> Option<()> {
     let [_, _, _, _, _, _, _, _, flags] = next(file)?;
     skip_palette(file, flags)?;
@@ -64,7 +64,7 @@ fn skip_frame(file: &mut impl Read) -> Option<()> {
     sub_blocks(file, |_| {})
 }
 
-/// Takes blocks of at most 255 bytes, up to an empty one.
+/// Reads sub-blocks of at most 255 bytes, up to an empty one.
 fn sub_blocks(file: &mut impl Read, mut take: impl FnMut(&[u8])) -> Option<()> {
     let mut content = [0; 255];
     loop {

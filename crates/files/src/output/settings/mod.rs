@@ -1,4 +1,4 @@
-//! Settings that glimt wrote into a picture, read again: they tell how it was made.
+//! Reads the settings that glimt wrote into an image.
 
 mod gif;
 mod text;
@@ -10,54 +10,54 @@ use std::path::{Path, PathBuf};
 
 use ::exr::meta::MetaData;
 
-use super::part::{Kind, PartFile};
+use super::part::{PartFile, PartKind};
 use super::{PROGRAM, SOFTWARE};
 use crate::system::describe_error;
 use crate::system::file::{self, PART_MARK};
 
-/// Bytes at the start of a file in which its settings are: behind them are pixels.
+/// Bytes at the start of a file that contain the settings, before the pixels.
 const START_BYTES: u64 = 4 << 20;
-/// Most settings of a file.
-const MOST: usize = 200;
-/// Start of the names of glimt's own settings.
-const OWN: &str = "glimt:";
+/// Maximum number of settings.
+const LIMIT: usize = 200;
+/// Prefix of the names of glimt's own settings.
+const PREFIX: &str = "glimt:";
 
-/// A picture by its header.
+/// Properties of an image file from its header.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Made {
-    /// The format in words: "PNG", "part 2 of 8".
+pub struct ImageInfo {
+    /// Description of the format: "PNG", "part 2 of 8".
     pub format: String,
-    /// Columns and rows. `None` if the header does not tell.
+    /// Width and height. `None` if the header does not contain them.
     pub size: Option<(u32, u32)>,
-    /// Frames of a moving picture.
+    /// Number of frames of an animation.
     pub frames: Option<u32>,
-    /// Name and version of the program that wrote it.
+    /// Program and version that wrote the file.
     pub program: Option<String>,
-    /// Names and values of the settings, in the order of the file.
+    /// Names and values of the settings, in file order.
     pub settings: Vec<(String, String)>,
-    /// Names of the channels of an EXR file.
+    /// Channel names of an EXR file.
     pub channels: Vec<String>,
 }
 
-impl Made {
-    /// Whether glimt wrote it, of any version.
+impl ImageInfo {
+    /// Whether any version of glimt wrote the file.
     pub fn is_own(&self) -> bool {
         self.program.as_deref().is_some_and(|program| program.split(' ').next() == Some(PROGRAM))
     }
 
-    /// Adds a text of the file.
+    /// Adds a metadata entry.
     fn add(&mut self, name: &str, value: &str) {
         match name {
             "Software" | "SOFTWARE" => self.program = Some(value.to_owned()),
-            _ if self.settings.len() < MOST => {
-                let name = name.strip_prefix(OWN).unwrap_or(name);
+            _ if self.settings.len() < LIMIT => {
+                let name = name.strip_prefix(PREFIX).unwrap_or(name);
                 self.settings.push((name.to_owned(), value.to_owned()));
             }
             _ => {}
         }
     }
 
-    /// Adds a line `name: value`. Other lines are ignored.
+    /// Adds a line of the form `name: value`. Ignores other lines.
     fn add_line(&mut self, line: &str) {
         if let Some((name, value)) = line.split_once(": ") {
             self.add(name.trim(), value.trim());
@@ -65,9 +65,9 @@ impl Made {
     }
 }
 
-/// Reasons for which it is not known how a file was made.
+/// Reason for which a file's settings cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum MadeError {
+pub enum ImageInfoError {
     /// The file cannot be read.
     #[error("cannot read {}: {why}", path.display())]
     Unreadable {
@@ -76,7 +76,7 @@ pub enum MadeError {
         /// The reason.
         why: String,
     },
-    /// The header of the picture cannot be read.
+    /// The header of the image cannot be read.
     #[error("{}: {why}", path.display())]
     Damaged {
         /// The file.
@@ -84,51 +84,51 @@ pub enum MadeError {
         /// The reason.
         why: String,
     },
-    /// The file is no picture that carries settings.
+    /// The file is not an image that can store settings.
     #[error(
-        "{}: it is no picture that carries settings: png, apng, gif, exr, hdr, jpg, ppm, webp, nor a part or a checkpoint",
+        "{}: not an image with settings (png, apng, gif, exr, hdr, jpg, ppm, webp), a part or a checkpoint",
         path.display()
     )]
-    NoPicture {
+    NotAnImage {
         /// The file.
         path: PathBuf,
     },
 }
 
-/// Returns how a file was made: a picture of any format that glimt writes, a part or a checkpoint.
+/// Reads the properties of an image in any format that glimt writes, or of a part or checkpoint.
 ///
 /// # Errors
-/// [`MadeError`].
-pub fn made(path: &Path) -> Result<Made, MadeError> {
-    let unreadable = |why: String| MadeError::Unreadable { path: path.to_owned(), why };
+/// [`ImageInfoError`].
+pub fn read_info(path: &Path) -> Result<ImageInfo, ImageInfoError> {
+    let unreadable = |why: String| ImageInfoError::Unreadable { path: path.to_owned(), why };
     let (opened, _) = match file::open(path) {
         Ok(Ok(found)) => found,
-        Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a file", kind.words()))),
+        Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a regular file", kind.words()))),
         Err(error) => return Err(unreadable(describe_error(&error))),
     };
     let start = start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
     if start.starts_with(&PART_MARK) {
-        // Do not need two descriptors at once.
+        // `read_part` opens the file again. Use only one descriptor at a time.
         drop(opened);
-        return of_part(path).map_err(unreadable);
+        return read_part(path).map_err(unreadable);
     }
-    // A WebP file has its settings behind the pixels.
+    // WebP stores metadata after the pixels.
     if start.len() as u64 == START_BYTES
         && start.starts_with(b"RIFF")
-        && let Some(made) = webp::of_webp(&opened)
+        && let Some(info) = webp::read_webp(&opened)
     {
-        return Ok(made);
+        return Ok(info);
     }
-    // The frames of a GIF go on to its end.
+    // Frames of a GIF continue to the end of the file.
     if start.len() as u64 == START_BYTES && start.starts_with(b"GIF") {
         let rest = BufReader::new(&opened);
-        if let Some(made) = gif::of_gif(start.chain(rest)) {
-            return Ok(made);
+        if let Some(info) = gif::read_gif(start.chain(rest)) {
+            return Ok(info);
         }
     }
-    of_bytes(&start).map_err(|why| match why {
-        Some(why) => MadeError::Damaged { path: path.to_owned(), why },
-        None => MadeError::NoPicture { path: path.to_owned() },
+    read_header(&start).map_err(|why| match why {
+        Some(why) => ImageInfoError::Damaged { path: path.to_owned(), why },
+        None => ImageInfoError::NotAnImage { path: path.to_owned() },
     })
 }
 
@@ -138,79 +138,80 @@ fn start(file: &File) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The same by the first bytes of a picture.
+/// Reads the properties of an image from its first bytes.
 ///
 /// # Errors
-/// What is wrong with its header. `None` if no picture that carries settings begins so.
-fn of_bytes(bytes: &[u8]) -> Result<Made, Option<String>> {
-    let wrong = |format: &str| Some(format!("its {format} header is damaged or cut short"));
+/// The fault of the header. `None` for a file of another format.
+fn read_header(bytes: &[u8]) -> Result<ImageInfo, Option<String>> {
+    let wrong = |format: &str| Some(format!("the {format} header is damaged or truncated"));
     match bytes {
-        [0x89, b'P', b'N', b'G', ..] => of_png(bytes).ok_or_else(|| wrong("PNG")),
-        [0x76, 0x2f, 0x31, 0x01, ..] => of_exr(bytes).ok_or_else(|| wrong("EXR")),
-        [b'#', b'?', ..] => text::of_hdr(bytes).ok_or_else(|| wrong("HDR")),
-        [b'P', b'6', ..] => text::of_ppm(bytes).ok_or_else(|| wrong("PPM")),
-        [0xff, 0xd8, ..] => text::of_jpeg(bytes).ok_or_else(|| wrong("JPEG")),
-        [b'R', b'I', b'F', b'F', ..] => webp::of_webp(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
-        [b'G', b'I', b'F', ..] => gif::of_gif(bytes).ok_or_else(|| wrong("GIF")),
+        [0x89, b'P', b'N', b'G', ..] => read_png(bytes).ok_or_else(|| wrong("PNG")),
+        [0x76, 0x2f, 0x31, 0x01, ..] => read_exr(bytes).ok_or_else(|| wrong("EXR")),
+        [b'#', b'?', ..] => text::read_hdr(bytes).ok_or_else(|| wrong("HDR")),
+        [b'P', b'6', ..] => text::read_ppm(bytes).ok_or_else(|| wrong("PPM")),
+        [0xff, 0xd8, ..] => text::read_jpeg(bytes).ok_or_else(|| wrong("JPEG")),
+        [b'R', b'I', b'F', b'F', ..] => webp::read_webp(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
+        [b'G', b'I', b'F', ..] => gif::read_gif(bytes).ok_or_else(|| wrong("GIF")),
         _ => Err(None),
     }
 }
 
-fn of_png(bytes: &[u8]) -> Option<Made> {
+fn read_png(bytes: &[u8]) -> Option<ImageInfo> {
     let limits = ::png::Limits { bytes: START_BYTES as usize };
     let mut decoder = ::png::Decoder::new_with_limits(Cursor::new(bytes), limits);
     decoder.set_ignore_iccp_chunk(true);
-    let info = decoder.read_header_info().ok()?;
-    let (width, height, bits) = (info.width, info.height, info.bit_depth as u8);
-    let mut made = Made { size: Some((width, height)), ..Made::default() };
+    let header = decoder.read_header_info().ok()?;
+    let (width, height, bits) = (header.width, header.height, header.bit_depth as u8);
+    let mut info = ImageInfo { size: Some((width, height)), ..ImageInfo::default() };
     let reader = decoder.read_info().ok()?;
-    let info = reader.info();
-    made.frames = info.animation_control.map(|control| control.num_frames);
-    made.format = match made.frames {
+    let header = reader.info();
+    info.frames = header.animation_control.map(|control| control.num_frames);
+    info.format = match info.frames {
         Some(_) => "APNG".to_owned(),
-        None => format!("PNG, {bits} bits a channel"),
+        None => format!("PNG, {bits} bits per channel"),
     };
-    for text in &info.uncompressed_latin1_text {
-        made.add(&text.keyword, &text.text);
+    for text in &header.uncompressed_latin1_text {
+        info.add(&text.keyword, &text.text);
     }
-    for text in &info.utf8_text {
-        made.add(&text.keyword, &text.get_text().unwrap_or_default());
+    for text in &header.utf8_text {
+        info.add(&text.keyword, &text.get_text().unwrap_or_default());
     }
-    Some(made)
+    Some(info)
 }
 
-fn of_exr(bytes: &[u8]) -> Option<Made> {
+fn read_exr(bytes: &[u8]) -> Option<ImageInfo> {
     let meta = MetaData::read_from_buffered(BufReader::new(Cursor::new(bytes)), false).ok()?;
     let header = meta.headers.first()?;
     let size =
         (u32::try_from(header.layer_size.width()).ok()?, u32::try_from(header.layer_size.height()).ok()?);
     let channels = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
-    let mut made = Made { format: "EXR".to_owned(), size: Some(size), channels, ..Made::default() };
-    made.program = header.own_attributes.software_name.as_ref().map(ToString::to_string);
+    let mut info = ImageInfo { format: "EXR".to_owned(), size: Some(size), channels, ..ImageInfo::default() };
+    info.program = header.own_attributes.software_name.as_ref().map(ToString::to_string);
     if let Some(comments) = &header.own_attributes.comments {
-        // As UTF-8: the texts of the library are bytes.
+        // The library's texts are bytes. Decode them as UTF-8.
         let comments: Vec<u8> = comments.as_slice().to_vec();
-        String::from_utf8_lossy(&comments).lines().for_each(|line| made.add_line(line));
+        String::from_utf8_lossy(&comments).lines().for_each(|line| info.add_line(line));
     }
-    Some(made)
+    Some(info)
 }
 
-fn of_part(path: &Path) -> Result<Made, String> {
+fn read_part(path: &Path) -> Result<ImageInfo, String> {
     let head = PartFile::head(path).map_err(|error| error.to_string())?;
     let format = match head.kind {
-        Kind::Part => format!("part {} of {}", head.share.index, head.share.count),
-        Kind::Checkpoint => "checkpoint".to_owned(),
+        PartKind::Part => format!("part {} of {}", head.share.index, head.share.count),
+        PartKind::Checkpoint => "checkpoint".to_owned(),
     };
-    let mut made = Made { format, size: Some((head.picture.width, head.picture.height)), ..Made::default() };
-    for one in &head.identity {
-        match one.name.as_str() {
-            PROGRAM => made.program = Some(format!("{PROGRAM} {}", one.value)),
-            name => made.add(name, &one.value),
+    let mut info =
+        ImageInfo { format, size: Some((head.picture.width, head.picture.height)), ..ImageInfo::default() };
+    for input in &head.identity {
+        match input.name.as_str() {
+            PROGRAM => info.program = Some(format!("{PROGRAM} {}", input.value)),
+            name => info.add(name, &input.value),
         }
     }
-    // A head without the version is of this one: others are not read.
-    made.program.get_or_insert_with(|| SOFTWARE.to_owned());
-    Ok(made)
+    // Files without the program's version are from this version, because others are rejected.
+    info.program.get_or_insert_with(|| SOFTWARE.to_owned());
+    Ok(info)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-use super::super::{EncodeOptions, Format, MovingFormat, encode, moving};
+use super::super::{AnimationFormat, EncodeOptions, Format, animation, encode};
 use super::*;
 use crate::control::CancelToken;
 use crate::film::{Picture, RadianceImage};
@@ -15,67 +15,68 @@ fn expected() -> Vec<(String, String)> {
 }
 
 #[test]
-fn every_format_gives_back_what_was_written_into_it() {
+fn settings_survive_a_round_trip_in_all_formats() {
     let image = RadianceImage::black(12, 7);
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };
-    for ending in Format::endings() {
-        let format = Format::of(Path::new(&format!("a.{ending}"))).expect("a format");
+    for extension in Format::extensions() {
+        let format = Format::from_path(Path::new(&format!("a.{extension}"))).expect("a format");
         let bytes = encode(&image, &options, format, &CancelToken::new()).expect("encoded");
-        let mut made = of_bytes(&bytes).expect(ending);
-        assert_eq!(made.size, Some((12, 7)), "{ending}");
-        assert_eq!(made.program.as_deref(), Some(SOFTWARE), "{ending}");
-        assert!(made.is_own() && made.frames.is_none());
-        // PNG has texts beyond ASCII apart from the others.
+        let mut info = read_header(&bytes).expect(extension);
+        assert_eq!(info.size, Some((12, 7)), "{extension}");
+        assert_eq!(info.program.as_deref(), Some(SOFTWARE), "{extension}");
+        assert!(info.is_own() && info.frames.is_none());
+        // PNG stores texts beyond ASCII separately, which changes the order.
         let mut expected = expected();
-        made.settings.sort();
+        info.settings.sort();
         expected.sort();
-        assert_eq!(made.settings, expected, "{ending}");
-        assert_eq!(made.channels, if ending == "exr" { vec!["B", "G", "R"] } else { vec![] });
-        image::load_from_memory(&bytes).expect("whole with its comments");
+        assert_eq!(info.settings, expected, "{extension}");
+        assert_eq!(info.channels, if extension == "exr" { vec!["B", "G", "R"] } else { vec![] });
+        image::load_from_memory(&bytes).expect("still a valid image");
     }
 }
 
 #[test]
-fn moving_pictures_too() {
+fn settings_survive_a_round_trip_in_animations() {
     let frame = Picture { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
-    for (format, name, frames) in [(MovingFormat::Gif, "GIF", Some(3)), (MovingFormat::Apng, "APNG", Some(3))]
+    for (format, name, frames) in
+        [(AnimationFormat::Gif, "GIF", Some(3)), (AnimationFormat::Apng, "APNG", Some(3))]
     {
-        let bytes = moving::encode(&vec![frame.clone(); 3], &settings(), format, &CancelToken::new());
-        let mut made = of_bytes(&bytes.expect("encoded")).expect("read");
-        assert_eq!((made.format.as_str(), made.size, made.frames), (name, Some((5, 4)), frames));
-        made.settings.sort();
-        assert_eq!(made.settings.len(), 3);
-        assert!(made.settings.contains(&("scene".to_owned(), "hüte.toml".to_owned())));
+        let bytes = animation::encode(&vec![frame.clone(); 3], &settings(), format, &CancelToken::new());
+        let mut info = read_header(&bytes.expect("encoded")).expect("read");
+        assert_eq!((info.format.as_str(), info.size, info.frames), (name, Some((5, 4)), frames));
+        info.settings.sort();
+        assert_eq!(info.settings.len(), 3);
+        assert!(info.settings.contains(&("scene".to_owned(), "hüte.toml".to_owned())));
     }
 }
 
 #[test]
-fn pictures_of_others_say_nothing_and_other_files_are_none() {
+fn foreign_images_have_no_settings() {
     let mut bytes = Vec::new();
-    let picture = image::RgbImage::new(3, 2);
-    picture.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).expect("encoded");
-    let made = of_bytes(&bytes).expect("a picture");
-    assert!(!made.is_own() && made.settings.is_empty() && made.size == Some((3, 2)));
-    assert!(of_bytes(b"[camera]\n").is_err_and(|why| why.is_none()));
+    let foreign = image::RgbImage::new(3, 2);
+    foreign.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png).expect("encoded");
+    let info = read_header(&bytes).expect("an image");
+    assert!(!info.is_own() && info.settings.is_empty() && info.size == Some((3, 2)));
+    assert_eq!(read_header(b"[camera]\n"), Err(None));
 }
 
-/// Headers that end early or are full of zeros, ones or noise are errors, or pictures without settings.
+/// Truncated or corrupted headers are errors, or images without settings.
 #[test]
-fn broken_headers_do_no_harm() {
+fn corrupt_headers_do_not_panic() {
     let options = EncodeOptions { metadata: settings(), ..EncodeOptions::default() };
     let image = RadianceImage::black(12, 7);
-    let mut whole: Vec<Vec<u8>> = Format::endings()
-        .map(|ending| Format::of(Path::new(&format!("a.{ending}"))).expect("a format"))
+    let mut files: Vec<Vec<u8>> = Format::extensions()
+        .map(|extension| Format::from_path(Path::new(&format!("a.{extension}"))).expect("a format"))
         .map(|format| encode(&image, &options, format, &CancelToken::new()).expect("encoded"))
         .collect();
     let frame = Picture { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
-    whole.push(
-        moving::encode(&[frame], &settings(), MovingFormat::Gif, &CancelToken::new()).expect("encoded"),
+    files.push(
+        animation::encode(&[frame], &settings(), AnimationFormat::Gif, &CancelToken::new()).expect("encoded"),
     );
     let mut next = crate::math::random::unit(5);
-    for bytes in whole {
+    for bytes in files {
         for end in 0..bytes.len() {
-            let _ = of_bytes(&bytes[..end]);
+            let _ = read_header(&bytes[..end]);
         }
         for _ in 0..300 {
             let mut bytes = bytes.clone();
@@ -83,17 +84,18 @@ fn broken_headers_do_no_harm() {
                 let at = (next() * bytes.len() as f32) as usize % bytes.len();
                 bytes[at] = (next() * 256.0) as u8;
             }
-            let _ = of_bytes(&bytes);
+            let _ = read_header(&bytes);
         }
     }
 }
 
-/// Frames may be far behind the header, each with a palette of its own; a file that is cut short has no known number of them.
+/// Frames may be far from the header and have their own palettes. The number of frames of a truncated file is
+/// unknown.
 #[test]
-fn frames_of_a_gif_are_counted_to_its_end() {
+fn gif_frames_are_counted_to_the_end() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.gif");
-    // The codes of pixels are passed over, so they may be anything.
+    // Pixel data is skipped, so it may be arbitrary.
     let mut bytes = b"GIF89a\x90\x01\x90\x01\x80\0\0\0\0\0\xff\xff\xff".to_vec();
     for _ in 0..30 {
         bytes.extend(b",\0\0\0\0\x90\x01\x90\x01\x81\0\0\0\x11\x11\x11\x22\x22\x22\x33\x33\x33\x02");
@@ -103,10 +105,10 @@ fn frames_of_a_gif_are_counted_to_its_end() {
     bytes.push(b';');
     assert!(bytes.len() as u64 > START_BYTES, "{}", bytes.len());
     std::fs::write(&path, &bytes).expect("written");
-    assert_eq!(made(&path).expect("read").frames, Some(30));
+    assert_eq!(read_info(&path).expect("read").frames, Some(30));
     std::fs::write(&path, &bytes[..bytes.len() - 9]).expect("written");
-    let cut = made(&path).expect("read");
+    let cut = read_info(&path).expect("read");
     assert_eq!((cut.frames, cut.size), (None, Some((400, 400))));
     let local = b"GIF89a\x01\0\x01\0\0\0\0,\0\0\0\0\x01\0\x01\0\x80\0\0\0\xff\xff\xff\x02\x02L\x01\0;";
-    assert_eq!(of_bytes(local).expect("read").frames, Some(1));
+    assert_eq!(read_header(local).expect("read").frames, Some(1));
 }

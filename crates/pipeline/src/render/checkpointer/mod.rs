@@ -18,10 +18,10 @@ use crate::inputs::Inputs;
 use crate::integrators::RayCounters;
 use crate::messages;
 use crate::output::part::{
-    self, Head, Kind, PartError, PartFile, PictureHead, ShareHead, Trait, differences,
+    self, Dependency, Head, ImageHead, PartError, PartFile, PartKind, ShareHead, differences,
 };
 use crate::output::write::{Durability, Guard};
-use crate::output::{Finish, Losses, OutputError};
+use crate::output::{DevelopSettings, Losses, OutputError};
 use crate::protocol::CheckpointNews;
 use crate::settings::{Checkpoints, Resume};
 use crate::sink::Sink;
@@ -34,9 +34,14 @@ const TIME_SHARE: u32 = 100;
 const ENDING: &str = ".checkpoint";
 
 /// Creates the head of a part or checkpoint file.
-pub(crate) fn head(kind: Kind, state: &FilmState, identity: Vec<Trait>, finish: &Finish) -> Head {
+pub(crate) fn head(
+    kind: PartKind,
+    state: &FilmState,
+    identity: Vec<Dependency>,
+    finish: &DevelopSettings,
+) -> Head {
     let share = share_head(state.share.as_ref());
-    Head { kind, identity, share, picture: PictureHead::new(&state.film, finish), scene: String::new() }
+    Head { kind, identity, share, picture: ImageHead::new(&state.film, finish), scene: String::new() }
 }
 
 fn share_head(share: Option<&Share>) -> ShareHead {
@@ -64,11 +69,11 @@ pub(crate) fn path_of(output: &Path) -> PathBuf {
 /// Context of a render with checkpoints.
 #[derive(Clone, Copy)]
 pub(crate) struct CheckpointContext<'a> {
-    pub(crate) finish: &'a Finish,
+    pub(crate) finish: &'a DevelopSettings,
     pub(crate) inputs: &'a Inputs,
     pub(crate) sink: &'a Sink,
     /// Computes the names and values of everything that the image depends on. Slow.
-    pub(crate) name: &'a dyn Fn() -> Vec<Trait>,
+    pub(crate) name: &'a dyn Fn() -> Vec<Dependency>,
     /// Returns why the render is interrupted.
     pub(crate) interruption: &'a dyn Fn() -> Interruption,
     /// Checkpoint state of the process.
@@ -81,7 +86,7 @@ pub(crate) struct Checkpointer<'a> {
     path: PathBuf,
     settings: Checkpoints,
     around: CheckpointContext<'a>,
-    identity: OnceCell<Vec<Trait>>,
+    identity: OnceCell<Vec<Dependency>>,
     due: Cell<Instant>,
     /// Whether the checkpoint held by this process is of this render.
     is_own: Cell<bool>,
@@ -101,7 +106,7 @@ impl<'a> Checkpointer<'a> {
         }
     }
 
-    fn identity(&self) -> &[Trait] {
+    fn identity(&self) -> &[Dependency] {
         self.identity.get_or_init(self.around.name)
     }
 
@@ -165,7 +170,7 @@ impl<'a> Checkpointer<'a> {
         }
         let path = self.output.clone();
         let file = match PartFile::open(&self.output, &CancelToken::new()) {
-            Ok(file) if file.head.kind == Kind::Part => file,
+            Ok(file) if file.head.kind == PartKind::Part => file,
             // Targets were checked before: a part never replaces a checkpoint.
             Ok(_) => return Ok(false),
             Err(error) => {
@@ -174,7 +179,7 @@ impl<'a> Checkpointer<'a> {
             }
         };
         let mut differences = self.unlike(&file.head, state);
-        let head = Head { scene: file.head.scene.clone(), ..self.head(Kind::Part, state) };
+        let head = Head { scene: file.head.scene.clone(), ..self.head(PartKind::Part, state) };
         if differences.is_empty() && file.head != head {
             differences.push("the output settings differ".to_owned());
         }
@@ -210,7 +215,7 @@ impl<'a> Checkpointer<'a> {
         let Some((head, there)) = kept_in(&self.path) else {
             return match PartFile::head(&self.path) {
                 Err(PartError::Version { .. }) => self.move_aside(|_| false),
-                Ok(head) if head.kind == Kind::Part => Err(is_finished_part(&self.path)),
+                Ok(head) if head.kind == PartKind::Part => Err(is_finished_part(&self.path)),
                 Ok(_)
                 | Err(
                     PartError::Unreadable { .. }
@@ -271,7 +276,7 @@ impl<'a> Checkpointer<'a> {
             return Err(other(unlike));
         }
         let file = PartFile::open(&self.path, &CancelToken::new())?;
-        file.check_kind(Kind::Checkpoint)?;
+        file.check_kind(PartKind::Checkpoint)?;
         // Validate the whole file before changing anything.
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
         let read: State =
@@ -291,7 +296,7 @@ impl<'a> Checkpointer<'a> {
         Ok(())
     }
 
-    fn head(&self, kind: Kind, state: &FilmState) -> Head {
+    fn head(&self, kind: PartKind, state: &FilmState) -> Head {
         head(kind, state, self.identity().to_vec(), self.around.finish)
     }
 
@@ -378,7 +383,7 @@ impl<'a> Checkpointer<'a> {
             self.tell_failure(&why);
             return false;
         }
-        let head = self.head(Kind::Checkpoint, state);
+        let head = self.head(PartKind::Checkpoint, state);
         let written = serde_json::to_value(State::of(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save(&head, &state.film, &value, durability));
@@ -409,7 +414,7 @@ impl<'a> Checkpointer<'a> {
                     path.display(),
                     messages::NOT_A_CHECKPOINT
                 )),
-                Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == Kind::Part) => {
+                Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == PartKind::Part) => {
                     Err(OutputError::Refused { reason: is_finished_part(path) })
                 }
                 // Another process may have taken the file since the last check.
@@ -421,7 +426,7 @@ impl<'a> Checkpointer<'a> {
             is_kept: &|path| inputs.contain(path),
             may_replace: &may_replace,
             sweep: None,
-            losses: Losses::Told(&|_| ()),
+            losses: Losses::Report(&|_| ()),
         };
         // This short write is never cancelled, because a signal may be the reason for it.
         let file = part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))?;
@@ -471,7 +476,7 @@ fn why(error: &PartError) -> String {
 /// Reads the head and the state of a valid checkpoint.
 fn kept_in(path: &Path) -> Option<(Head, State)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
-    file.check_kind(Kind::Checkpoint).ok()?;
+    file.check_kind(PartKind::Checkpoint).ok()?;
     let state: State = serde_json::from_value(file.state).ok()?;
     state.is_possible().then_some((file.head, state))
 }

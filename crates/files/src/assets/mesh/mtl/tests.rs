@@ -37,7 +37,7 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
     Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
 }
 
-/// Asserts that line 2 of a text is rejected for these missing arguments.
+/// Asserts that `line` of a text is rejected because `expected` is missing after `keyword`.
 #[track_caller]
 fn assert_rejected(text: &str, line: usize, keyword: &str, expected: &str) {
     assert_eq!(rejection(read(text)), (Some(line), expected_after(keyword, expected)), "{text}");

@@ -1,48 +1,48 @@
-//! Moving pictures: GIF and APNG, from frames of 8 bits a channel.
+//! Animations: GIF and APNG from 8-bit frames.
 
 mod apng;
 mod dither;
 mod gif;
 
-use super::{MovingFormat, OutputError};
+use super::{AnimationFormat, OutputError};
 use crate::control::CancelToken;
 use crate::film::Picture;
 
-/// Seconds of a whole turn.
+/// Duration of a full turn in seconds.
 const TURN_SECONDS: f64 = 4.0;
-/// Shortest time of a frame in seconds: players show shorter ones for a tenth of a second.
+/// Minimum duration of a frame in seconds. Players slow down shorter frames to a tenth of a second.
 const SHORTEST_FRAME: f64 = 0.02;
 
-/// The bytes of a file that plays these frames, all of one size, again and again. The same frames give the same bytes.
+/// Encodes an endless animation from frames of the same size. The same frames always give the same bytes.
 ///
 /// # Errors
-/// Frames that the format cannot hold; an encoder that fails; [`OutputError::Cancelled`].
+/// The format does not support the frames; the encoder fails; [`OutputError::Cancelled`].
 pub fn encode(
     frames: &[Picture],
     metadata: &[(String, String)],
-    format: MovingFormat,
+    format: AnimationFormat,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let failed = |why: String| OutputError::Moving { format, why };
+    let failed = |why: String| OutputError::Animation { format, why };
     let Some(first) = frames.first() else { return Err(failed("has no frames".to_owned())) };
     format.check_size(first.width, first.height)?;
-    let is_alike = |frame: &Picture| {
+    let fits = |frame: &Picture| {
         (frame.width, frame.height) == (first.width, first.height)
             && frame.pixels.len() == first.width as usize * first.height as usize
     };
-    if !frames.iter().all(is_alike) {
+    if !frames.iter().all(fits) {
         return Err(failed("has frames of different sizes".to_owned()));
     }
     let bytes = match format {
-        MovingFormat::Gif => gif::encode(frames, metadata, token).map_err(|error| error.to_string()),
-        MovingFormat::Apng => apng::encode(frames, metadata, token).map_err(|error| error.to_string()),
+        AnimationFormat::Gif => gif::encode(frames, metadata, token).map_err(|error| error.to_string()),
+        AnimationFormat::Apng => apng::encode(frames, metadata, token).map_err(|error| error.to_string()),
     };
-    // An encoder that was stopped reports an error of its own.
+    // A cancelled encoder reports an error of its own.
     token.check()?;
     bytes.map_err(|why| failed(format!("could not be encoded: {why}")))
 }
 
-/// Time of a frame in units of which a second has so many.
+/// Duration of a frame in units of 1/`per_second` s.
 fn frame_time(frames: usize, per_second: f64) -> f64 {
     (TURN_SECONDS / frames as f64).max(SHORTEST_FRAME) * per_second
 }

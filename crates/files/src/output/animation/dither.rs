@@ -1,31 +1,31 @@
-//! Ordered dithering to a palette (T. Knoll, US patent 6,606,166, expired): a pixel's place and colour alone decide what stands
-//! for it. So what stays in place looks the same in each frame, which error diffusion does not give.
+//! Ordered dithering to a palette (T. Knoll, US patent 6,606,166, expired). The result depends only on a
+//! pixel's position and color, so that static parts do not flicker between frames as with error diffusion.
 
 use std::collections::HashMap;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::film::Picture;
 
-/// Columns and rows of the pattern.
+/// Width and height of the pattern.
 const SIDE: usize = 4;
-/// Colours that a pattern mixes.
+/// Number of colors that a pattern mixes.
 const MIXED: usize = SIDE * SIDE;
 
-/// Ranks of the pattern's places (B. Bayer, 1973).
+/// Thresholds of the pattern (B. Bayer, 1973).
 const RANKS: [usize; MIXED] = [0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5];
 
-/// Dithering to one palette.
+/// Dithers to a palette.
 pub(super) struct Dither {
     palette: Vec<[i32; 3]>,
 }
 
 impl Dither {
-    /// Dithering to a palette of three bytes a colour, at most 256.
+    /// Creates a ditherer for a palette of up to 256 colors, three bytes each.
     pub(super) fn new(palette: &[u8]) -> Self {
         Self { palette: palette.as_chunks().0.iter().map(|color: &[u8; 3]| color.map(i32::from)).collect() }
     }
 
-    /// The palette's index for each pixel.
+    /// Palette index of each pixel.
     pub(super) fn indices(&self, picture: &Picture, token: &CancelToken) -> Result<Vec<u8>, Cancelled> {
         let mut known: HashMap<[u8; 3], [u8; MIXED]> = HashMap::new();
         let mut indices = Vec::with_capacity(picture.pixels.len());
@@ -39,15 +39,15 @@ impl Dither {
         Ok(indices)
     }
 
-    /// Colours of the palette whose mean is near a colour, from dark to bright.
+    /// Palette colors whose mean approximates a color, from dark to bright.
     fn mixed(&self, color: [u8; 3]) -> [u8; MIXED] {
         let color = color.map(i32::from);
         let (mut mixed, mut error) = ([0; MIXED], [0; 3]);
-        for one in &mut mixed {
-            // Aim at what all colours so far lack.
+        for entry in &mut mixed {
+            // Compensate the accumulated error.
             let aim = [0, 1, 2].map(|channel: usize| color[channel] + error[channel]);
             let index = self.nearest(aim);
-            *one = index as u8;
+            *entry = index as u8;
             error = [0, 1, 2].map(|channel: usize| aim[channel] - self.palette[index][channel]);
         }
         let brightness = |index: &u8| {
@@ -60,9 +60,9 @@ impl Dither {
 
     fn nearest(&self, aim: [i32; 3]) -> usize {
         let distance = |color: &[i32; 3]| {
-            let by = |channel: usize| (color[channel] - aim[channel]).pow(2);
-            // Weights of the eye, roughly.
-            2 * by(0) + 4 * by(1) + by(2)
+            let squared = |channel: usize| (color[channel] - aim[channel]).pow(2);
+            // Approximate sensitivity of the eye.
+            2 * squared(0) + 4 * squared(1) + squared(2)
         };
         let nearest = self.palette.iter().enumerate().min_by_key(|(_, color)| distance(color));
         nearest.map_or(0, |(index, _)| index)

@@ -1,4 +1,4 @@
-//! The real place of a write: follows links, and recognises special files and places without write permission.
+//! Resolves the path of a write: follows links and detects special files and missing permissions.
 
 use std::fs::{self, Metadata};
 use std::io::{self, ErrorKind};
@@ -12,66 +12,66 @@ use nix::unistd::{AccessFlags, access};
 use super::protection::{self, Flag};
 use super::{OutputError, temporary};
 
-/// Most links to follow, as in Linux.
+/// Maximum number of links to follow, as in Linux.
 const LINKS: usize = 40;
 
-/// Place to which the bytes for a path go.
+/// Where the bytes for a path are written.
 #[derive(Debug)]
-pub(super) enum Place {
-    /// A regular file, existing or not, to be replaced as a whole.
-    File(Target),
-    /// A device, a pipe or an open descriptor, to be written as it is.
+pub(super) enum WriteTarget {
+    /// A regular file, existing or not, to be replaced atomically.
+    File(TargetFile),
+    /// A device, a pipe or an open descriptor, to be written in place.
     InPlace(PathBuf),
 }
 
-/// A regular file behind all links.
+/// A regular file after following all links.
 #[derive(Debug)]
-pub(super) struct Target {
+pub(super) struct TargetFile {
     pub(super) path: PathBuf,
-    /// Metadata of the existing file.
+    /// Metadata of the file, if it exists.
     pub(super) existing: Option<Metadata>,
 }
 
-impl Target {
-    /// The directory that the file is in.
+impl TargetFile {
+    /// Directory of the file.
     pub(super) fn directory(&self) -> &Path {
         directory_of(&self.path)
     }
 }
 
-/// Finds the place and checks that it can be written, as far as this is possible without writing.
-pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
+/// Resolves a path and checks that it can be written, as far as possible without writing.
+pub(super) fn find(path: &Path) -> Result<WriteTarget, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(is_a_directory(path));
     }
     match follow(path).map_err(|error| OutputError::file(path, error))? {
         (target, None) => new_file(path, target),
-        (_, Some(metadata)) if metadata.is_symlink() => Ok(Place::InPlace(path.to_owned())),
+        (_, Some(metadata)) if metadata.is_symlink() => Ok(WriteTarget::InPlace(path.to_owned())),
         (target, Some(metadata)) => existing(path, target, metadata),
     }
 }
 
-/// [`find`] before the work: also checks that the directory takes a file at all.
+/// [`find`], and checks that a file can be created in the directory.
 pub(super) fn check(path: &Path) -> Result<(), OutputError> {
     match find(path)? {
-        Place::File(target) => {
+        WriteTarget::File(target) => {
             let directory = target.directory();
             temporary::probe(directory).map_err(|error| match error.kind() {
-                // The directory existed a moment ago: /proc refuses files by this error.
+                // The directory existed a moment ago. /proc reports this error for new files.
                 ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
                     path: path.to_owned(),
-                    why: format!("the directory {} takes no files", directory.display()),
-                    way_out: "choose another place",
+                    why: format!("files cannot be created in the directory {}", directory.display()),
+                    way_out: "choose another location",
                 },
                 _ => OutputError::file(path, error),
             })
         }
-        Place::InPlace(_) => Ok(()),
+        WriteTarget::InPlace(_) => Ok(()),
     }
 }
 
-/// Follows the links of a path; returns the last path and the metadata of the file there. A link to an open descriptor
-/// (/dev/stdout leads to one) is not followed: it may lead to no path at all.
+/// Follows symbolic links and returns the final path with the metadata of its file. Links to open descriptors
+/// (such as /dev/stdout) are not followed because they may not correspond to a path.
 pub(super) fn follow(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
     for _ in 0..LINKS {
@@ -88,12 +88,12 @@ pub(super) fn follow(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     Err(Errno::ELOOP.into())
 }
 
-fn new_file(path: &Path, target: PathBuf) -> Result<Place, OutputError> {
+fn new_file(path: &Path, target: PathBuf) -> Result<WriteTarget, OutputError> {
     check_directory(path, directory_of(&target))?;
-    Ok(Place::File(Target { path: target, existing: None }))
+    Ok(WriteTarget::File(TargetFile { path: target, existing: None }))
 }
 
-fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, OutputError> {
+fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<WriteTarget, OutputError> {
     let kind = metadata.file_type();
     if kind.is_dir() {
         return Err(is_a_directory(path));
@@ -105,10 +105,11 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, O
     }
     if !kind.is_file() {
         may_write(path, &target, AccessFlags::W_OK)?;
-        return Ok(Place::InPlace(target));
+        return Ok(WriteTarget::InPlace(target));
     }
-    unflagged(path, "it", &target)?;
-    // Check the file too, although its directory decides whether it can be replaced: it may be protected on purpose.
+    check_flags(path, "it", &target)?;
+    // Check write permission although only the directory matters for replacing: the file may be read-only on
+    // purpose.
     may_write(path, &target, AccessFlags::W_OK)?;
     let directory = check_directory(path, directory_of(&target))?;
     if protection::is_kept_for_owner(&directory, &metadata) {
@@ -118,16 +119,16 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, O
             why: format!(
                 "it belongs to another user, and in the sticky directory {directory} only its owner may replace it"
             ),
-            way_out: "choose another name or place",
+            way_out: "choose another name or location",
         });
     }
-    Ok(Place::File(Target { path: target, existing: Some(metadata) }))
+    Ok(WriteTarget::File(TargetFile { path: target, existing: Some(metadata) }))
 }
 
 fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputError> {
     match fs::metadata(directory) {
         Ok(metadata) if metadata.is_dir() => {
-            unflagged(path, &format!("the directory {}", directory.display()), directory)?;
+            check_flags(path, &format!("the directory {}", directory.display()), directory)?;
             may_write(path, directory, AccessFlags::W_OK | AccessFlags::X_OK)?;
             Ok(metadata)
         }
@@ -135,16 +136,17 @@ fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputErro
         Err(error) if error.kind() == ErrorKind::NotFound => Err(OutputError::Target {
             path: path.to_owned(),
             why: format!("the directory {} does not exist", directory.display()),
-            way_out: "create it or choose another place",
+            way_out: "create it or choose another location",
         }),
         Err(error) => Err(OutputError::file(path, error)),
     }
 }
 
-/// Checks that no flag protects the file or directory from changes: the new file could be neither renamed nor removed.
-fn unflagged(path: &Path, called: &str, what: &Path) -> Result<(), OutputError> {
+/// Checks that no flag protects the file or directory from changes. Otherwise, the new file could be neither
+/// renamed nor removed.
+fn check_flags(path: &Path, name: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = Flag::of(what) else { return Ok(()) };
-    let why = format!("{called} is {}", flag.words());
+    let why = format!("{name} is {}", flag.words());
     Err(OutputError::Target { path: path.to_owned(), why, way_out: flag.way_out() })
 }
 
@@ -157,7 +159,7 @@ fn is_a_directory(path: &Path) -> OutputError {
     OutputError::Target { path: path.to_owned(), why, way_out: "name a file in it" }
 }
 
-/// The directory that a path is in; the working directory for a mere name.
+/// Directory of a path, or the working directory for a bare file name.
 pub(super) fn directory_of(path: &Path) -> &Path {
     match path.parent() {
         Some(directory) if !directory.as_os_str().is_empty() => directory,

@@ -1,4 +1,4 @@
-//! GIF: one palette for all frames, so that a colour that stays looks the same in each.
+//! GIF with one palette for all frames, so that static colors do not change between frames.
 
 use ::gif::{AnyExtension, Encoder, EncodingError, Extension, Frame, Repeat};
 use color_quant::NeuQuant;
@@ -10,11 +10,11 @@ use super::frame_time;
 use crate::control::CancelToken;
 use crate::film::Picture;
 
-/// Colours of the palette.
+/// Size of the palette.
 const COLORS: usize = 256;
-/// Pixels that the palette is made of, about.
+/// Approximate number of pixels from which the palette is computed.
 const SAMPLES: usize = 1 << 20;
-/// Effort of the quantiser: 1 uses every sample.
+/// Quantizer setting: 1 uses every sample.
 const EVERY_SAMPLE: i32 = 1;
 
 pub(super) fn encode(
@@ -24,10 +24,10 @@ pub(super) fn encode(
 ) -> Result<Vec<u8>, EncodingError> {
     let cancelled = |cancelled| EncodingError::from(std::io::Error::other(cancelled));
     let (width, height) = frames.first().map_or((0, 0), |first| (first.width as u16, first.height as u16));
-    // Choose the palette by pixels of all frames.
+    // Choose the palette from pixels of all frames.
     let palette = palette(frames);
     token.check().map_err(cancelled)?;
-    // Write the header: the palette, an endless loop, the settings as comments.
+    // Write the header: palette, infinite loop, metadata as comments.
     let mut encoder = Encoder::new(Vec::new(), width, height, &palette)?;
     encoder.set_repeat(Repeat::Infinite)?;
     let comment = AnyExtension::from(Extension::Comment);
@@ -36,38 +36,38 @@ pub(super) fn encode(
         let line = format!("{}: {}", one_line(name), one_line(value));
         encoder.write_raw_extension(comment, &[line.as_bytes()])?;
     }
-    // Write some frames at once, one for each thread.
+    // Compress several frames in parallel.
     let delay = frame_time(frames.len(), 100.0).round() as u16;
     let dither = Dither::new(&palette);
-    let compressed = |picture: &Picture| {
+    let compress = |picture: &Picture| {
         let buffer = dither.indices(picture, token)?;
         let mut frame = Frame { delay, width, height, buffer: buffer.into(), ..Frame::default() };
         frame.make_lzw_pre_encoded();
         Ok(frame)
     };
     let is_in_pool = rayon::current_thread_index().is_some();
-    let at_once = if is_in_pool { rayon::current_num_threads() } else { 1 };
-    for some in frames.chunks(at_once) {
-        let made: Result<Vec<_>, _> = match is_in_pool {
-            true => some.par_iter().map(compressed).collect(),
-            false => some.iter().map(compressed).collect(),
+    let batch_size = if is_in_pool { rayon::current_num_threads() } else { 1 };
+    for batch in frames.chunks(batch_size) {
+        let compressed: Result<Vec<_>, _> = match is_in_pool {
+            true => batch.par_iter().map(compress).collect(),
+            false => batch.iter().map(compress).collect(),
         };
-        for frame in made.map_err(cancelled)? {
+        for frame in compressed.map_err(cancelled)? {
             encoder.write_lzw_pre_encoded_frame(&frame)?;
         }
     }
     encoder.into_inner()
 }
 
-/// The colours that stand for those of all frames, three bytes each.
+/// Chooses the palette of all frames, three bytes per color.
 fn palette(frames: &[Picture]) -> Vec<u8> {
     let pixels: usize = frames.iter().map(|frame| frame.pixels.len()).sum();
-    // An odd step does not fall on the same columns again and again.
+    // An odd step avoids sampling the same columns in every row.
     let step = (pixels / SAMPLES) | 1;
     let all = frames.iter().flat_map(|frame| &frame.pixels);
     let samples: Vec<[u8; 4]> =
         all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();
-    // Few colours need no quantiser, which would move them a little.
+    // Keep few colors exactly instead of quantizing them.
     let mut colors: Vec<[u8; 4]> = frames.iter().flat_map(|frame| some_colors(&frame.pixels)).collect();
     colors.sort_unstable();
     colors.dedup();
@@ -77,7 +77,7 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
     NeuQuant::new(EVERY_SAMPLE, COLORS, samples.as_flattened()).color_map_rgb()
 }
 
-/// The different colours of a frame, but not more than need a quantiser.
+/// Distinct colors of a frame, up to one more than the palette can hold.
 fn some_colors(pixels: &[[u8; 3]]) -> Vec<[u8; 4]> {
     let mut colors = std::collections::BTreeSet::new();
     for &[red, green, blue] in pixels {

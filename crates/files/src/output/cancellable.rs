@@ -1,4 +1,4 @@
-//! Developing and encoding in small parts, with polls of the token between.
+//! Tone maps and encodes images in small parts, polling the cancel token in between.
 
 use std::fs::File;
 use std::io::{self, Cursor, ErrorKind, Seek, SeekFrom, Write};
@@ -12,15 +12,15 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
 use crate::film::tone::{develop, develop16};
 
-/// Pixels developed between two polls of the token: a few milliseconds, and enough for all threads.
+/// Pixels between two polls of the cancel token: a few milliseconds, and enough for all threads.
 const PIXELS: usize = 1 << 18;
 
-/// Bytes compressed or written between two polls of the token.
+/// Bytes compressed or written between two polls of the cancel token.
 pub(super) const BYTES: usize = 1 << 15;
 
-/// Develops the picture from the top. Components have one byte each, or two with the high one first, as PNG and PPM hold
-/// them. `take` gets them in order, at most [`BYTES`] at a time.
-pub(super) fn developed(
+/// Tone maps an image from the top. Components take one byte, or two in big-endian order, as in PNG and PPM.
+/// Passes the bytes to `take` in order, at most [`BYTES`] at a time.
+pub(super) fn develop_parts(
     image: &RadianceImage,
     options: &EncodeOptions,
     token: &CancelToken,
@@ -44,8 +44,8 @@ pub(super) fn developed(
     Ok(())
 }
 
-/// Bytes of the developed picture, three for each pixel.
-pub(super) fn developed_whole(
+/// Tone maps an image to three bytes per pixel.
+pub(super) fn develop_all(
     image: &RadianceImage,
     (options, format): (&EncodeOptions, Format),
     token: &CancelToken,
@@ -55,17 +55,18 @@ pub(super) fn developed_whole(
         picture.extend_from_slice(part);
         Ok(())
     };
-    developed(image, options, token, take).map_err(|error| OutputError::encoder(format, &error))?;
+    develop_parts(image, options, token, take).map_err(|error| OutputError::encoder(format, &error))?;
     Ok(picture)
 }
 
-/// A writer into memory that fails once the work is cancelled, so that encoders which do not poll the token end too.
-pub(super) struct Stoppable<'a> {
+/// A memory writer that fails after cancellation, which also stops encoders that do not poll the cancel
+/// token.
+pub(super) struct CancellableBuffer<'a> {
     bytes: Cursor<Vec<u8>>,
     token: &'a CancelToken,
 }
 
-impl<'a> Stoppable<'a> {
+impl<'a> CancellableBuffer<'a> {
     pub(super) fn new(token: &'a CancelToken) -> Self {
         Self { bytes: Cursor::new(Vec::new()), token }
     }
@@ -75,7 +76,7 @@ impl<'a> Stoppable<'a> {
     }
 }
 
-impl Write for Stoppable<'_> {
+impl Write for CancellableBuffer<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.token.check().map_err(io::Error::other)?;
         self.bytes.write(bytes)
@@ -86,13 +87,13 @@ impl Write for Stoppable<'_> {
     }
 }
 
-impl Seek for Stoppable<'_> {
+impl Seek for CancellableBuffer<'_> {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.bytes.seek(to)
     }
 }
 
-/// Writes all bytes, or stops between two parts.
+/// Writes all bytes, polling the cancel token between parts.
 pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     for part in bytes.chunks(1 << 20) {
         token.check().map_err(io::Error::other)?;
@@ -101,17 +102,17 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
-/// [`write_all`] to a pipe or a socket, whose reader may block as long as it likes.
-pub(super) fn write_as_taken(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
-    /// Bytes of a write. A pipe is ready when a page of it is free: a write of so many bytes does not block then.
-    const PART: usize = 4096;
+/// [`write_all`] to a pipe or a socket, whose reader may block for any time.
+pub(super) fn write_to_pipe(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
+    /// Bytes per write. A pipe that is ready has at least this much room, so the write does not block.
+    const PIPE_BYTES: usize = 4096;
     let mut rest = bytes;
     while !rest.is_empty() {
         wait_for_room(to, token)?;
-        match to.write(&rest[..rest.len().min(PART)]) {
+        match to.write(&rest[..rest.len().min(PIPE_BYTES)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
-            // Another process writes there too, and was faster.
+            // Another writer was faster.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }
@@ -120,12 +121,12 @@ pub(super) fn write_as_taken(mut to: &File, bytes: &[u8], token: &CancelToken) -
 }
 
 fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
-    /// Milliseconds between two polls of the token.
-    const LOOK: u8 = 50;
+    /// Milliseconds between two polls of the cancel token.
+    const POLL_MS: u8 = 50;
     loop {
         token.check().map_err(io::Error::other)?;
         let mut ends = [PollFd::new(to.as_fd(), PollFlags::POLLOUT)];
-        match poll(&mut ends, PollTimeout::from(LOOK)) {
+        match poll(&mut ends, PollTimeout::from(POLL_MS)) {
             Ok(0) | Err(Errno::EINTR) => {}
             Ok(_) => return Ok(()),
             Err(error) => return Err(error.into()),
@@ -133,8 +134,8 @@ fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
     }
 }
 
-/// Result of a write: a cancellation is not an error of the file. Only the error itself shows that the write was
-/// cancelled; the token may have been cancelled later, when the file was complete.
+/// Distinguishes a cancelled write from an error of the file. Only the error itself shows a cancellation; the
+/// token may have been cancelled later, after the file was complete.
 pub(super) fn or_cancelled<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,
@@ -150,51 +151,51 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_make_the_whole_and_a_cancel_ends_them() {
+    fn parts_make_up_the_image_and_can_be_cancelled() {
         let count = PIXELS + 70_000;
         let pixels = (0..count).map(|i| crate::math::Vec3::splat((i % 256) as f32 / 255.0)).collect();
         let image = RadianceImage { width: count as u32, height: 1, pixels };
         let options = EncodeOptions { bit_depth: BitDepth::Sixteen, ..Default::default() };
         let token = CancelToken::new();
-        let mut whole = Vec::new();
+        let mut all = Vec::new();
         let take = |bytes: &[u8]| {
             assert!(bytes.len() <= BYTES);
-            whole.extend_from_slice(bytes);
+            all.extend_from_slice(bytes);
             Ok(())
         };
-        developed(&image, &options, &token, take).expect("nobody cancels");
+        develop_parts(&image, &options, &token, take).expect("not cancelled");
         let expected = develop16(&image, &options.tone).pixels.into_flattened();
-        assert!(whole.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
+        assert!(all.as_chunks().0.iter().map(|two| u16::from_be_bytes(*two)).eq(expected));
         let mut parts = 0;
         let stop = |_: &[u8]| {
             parts += 1;
             token.cancel();
             Ok(())
         };
-        assert!(developed(&image, &options, &token, stop).is_err());
+        assert!(develop_parts(&image, &options, &token, stop).is_err());
         assert_eq!(parts, 1);
     }
 
     #[test]
-    fn only_what_was_stopped_is_cancelled() {
+    fn only_stopped_writes_count_as_cancelled() {
         let token = CancelToken::new();
         token.cancel();
-        let told = |result| or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
+        let classify = |result| or_cancelled(result, |error| OutputError::file("a.png".as_ref(), error));
         let stopped = write_all(Vec::new(), b"abc", &token);
-        assert!(matches!(told(stopped), Err(OutputError::Cancelled(_))));
+        assert!(matches!(classify(stopped), Err(OutputError::Cancelled(_))));
         let full = io::Error::from(io::ErrorKind::StorageFull);
-        assert!(matches!(told(Err(full)), Err(OutputError::File { .. })));
-        assert!(told(Ok(())).is_ok());
+        assert!(matches!(classify(Err(full)), Err(OutputError::File { .. })));
+        assert!(classify(Ok(())).is_ok());
     }
 
     #[test]
-    fn a_reader_that_takes_nothing_does_not_hold_up_a_cancel() {
+    fn a_blocked_reader_does_not_delay_a_cancel() {
         let (mut reader, writer) = io::pipe().expect("a pipe");
         let (to, token) = (File::from(std::os::fd::OwnedFd::from(writer)), CancelToken::new());
         nix::fcntl::fcntl(&to, nix::fcntl::FcntlArg::F_SETFL(nix::fcntl::OFlag::O_NONBLOCK)).expect("set");
         let bytes: Vec<u8> = (0..1_000_003_u32).map(|i| (i % 251) as u8).collect();
         std::thread::scope(|scope| {
-            let writing = scope.spawn(|| write_as_taken(&to, &bytes, &token));
+            let writing = scope.spawn(|| write_to_pipe(&to, &bytes, &token));
             let mut taken = vec![0; 500_000];
             io::Read::read_exact(&mut reader, &mut taken).expect("it writes");
             assert_eq!(taken, bytes[..taken.len()]);
@@ -205,9 +206,9 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_are_cancelled_take_no_more() {
+    fn a_cancelled_memory_writer_fails() {
         let token = CancelToken::new();
-        let mut bytes = Stoppable::new(&token);
+        let mut bytes = CancellableBuffer::new(&token);
         bytes.write_all(b"abc").expect("not cancelled yet");
         token.cancel();
         assert!(bytes.write_all(b"def").is_err());

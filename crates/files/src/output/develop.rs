@@ -1,32 +1,32 @@
-//! The last step of a picture: from a film to the bytes of a file, the same for one render and for merged parts.
+//! Encodes a film as an image file, the same way for a single render and for merged parts.
 
 use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with};
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
 use crate::film::{Film, Quantity, RadianceImage, SampleStats};
 
-/// Settings that turn a film into a file.
+/// Settings that determine the image file of a film.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finish {
-    /// Quantity of the film that the picture shows.
+pub struct DevelopSettings {
+    /// Quantity of the film to show.
     pub quantity: Quantity,
-    /// Tone mapping, before it knows the range of the picture.
+    /// Tone mapping, before its range is resolved for the image.
     pub tone: ToneMapping,
-    /// Bits per channel of PNG and PPM.
+    /// Bits per channel of PNG and PPM files.
     pub bit_depth: BitDepth,
-    /// Names and values for the file, without those that the film tells.
+    /// Metadata names and values, without those derived from the film.
     pub metadata: Vec<(String, String)>,
-    /// Whether the numbers are light, so that EXR files hold the error of its mean.
+    /// Whether the values are radiance, so that EXR files include the error of the mean.
     pub is_light: bool,
 }
 
-impl Finish {
-    /// The picture of a film.
+impl DevelopSettings {
+    /// The image of a film.
     pub fn image(&self, film: &Film) -> RadianceImage {
         film.image(self.quantity)
     }
 
-    /// The names and values for a file, with its samples behind the scene.
+    /// Metadata including the number of samples, which follows the scene.
     pub fn metadata_with(&self, SampleStats { min, mean, max }: SampleStats) -> Vec<(String, String)> {
         let mut metadata = self.metadata.clone();
         let samples =
@@ -35,10 +35,10 @@ impl Finish {
         metadata
     }
 
-    /// The bytes of a file. `image` is the picture of the film; the layers beside it are for EXR files.
+    /// Encodes an image file. `image` is the film's image; layers are only written to EXR files.
     ///
     /// # Errors
-    /// As [`encode`](super::encode).
+    /// Same as [`encode`](super::encode).
     pub fn encode(
         &self,
         film: &Film,
@@ -47,7 +47,7 @@ impl Finish {
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
         let tone = self.tone.resolved_for(image);
-        // Add what the film tells: the samples, the range at the end.
+        // Add the metadata derived from the film: samples, and the range at the end.
         let mut metadata = self.metadata_with(film.samples());
         let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use super::*;
 
-/// A gradient with a square that moves.
+/// A gradient with a moving square.
 fn frame(number: u32) -> Picture {
     let (width, height) = (96, 40);
     let pixel = |i: u32| {
@@ -21,28 +21,28 @@ fn metadata() -> Vec<(String, String)> {
     vec![("glimt:scene".to_owned(), "hüte.toml".to_owned())]
 }
 
-fn bytes(format: MovingFormat) -> Vec<u8> {
+fn bytes(format: AnimationFormat) -> Vec<u8> {
     encode(&frames(), &metadata(), format, &CancelToken::new()).expect("encoded")
 }
 
 #[test]
-fn an_apng_gives_its_frames_back() {
-    let bytes = bytes(MovingFormat::Apng);
+fn apng_frames_are_lossless() {
+    let bytes = bytes(AnimationFormat::Apng);
     let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().expect("PNG");
-    let control = *reader.info().animation_control().expect("it moves");
+    let control = *reader.info().animation_control().expect("an animation");
     assert_eq!((control.num_frames, control.num_plays), (8, 0));
     for expected in frames() {
         let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
         reader.next_frame(&mut pixels).expect("a frame");
         assert_eq!(pixels, expected.pixels.as_flattened());
-        let delay = reader.info().frame_control().expect("a frame of several");
+        let delay = reader.info().frame_control().expect("frame control");
         assert_eq!((delay.delay_num, delay.delay_den), (500, 1000), "8 frames in 4 s");
     }
     assert_eq!(reader.info().uncompressed_latin1_text[0].text, crate::output::SOFTWARE);
-    assert!(bytes == self::bytes(MovingFormat::Apng));
+    assert!(bytes == self::bytes(AnimationFormat::Apng));
 }
 
-/// The decoded frames of a GIF: three bytes a pixel.
+/// Decodes the frames of a GIF, three bytes per pixel.
 fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut options = ::gif::DecodeOptions::new();
     options.set_color_output(::gif::ColorOutput::Indexed);
@@ -58,10 +58,11 @@ fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
     frames
 }
 
-/// Means over blocks of 4 × 4 pixels are nearly those of the frame, far nearer than those of the nearest colours, which make bands.
+/// Means over blocks of 4 × 4 pixels are close to the frame, much closer than with nearest colors, which
+/// cause banding.
 #[test]
 fn a_gif_keeps_gradients_on_average() {
-    // Slow gradients in many colours: the palette's are far apart.
+    // Slow gradients in many colors, so that palette colors are far apart.
     let smooth = |number: u32| {
         let pixel = |i: u32| {
             let (x, y, k) = (i % 96, i / 96, number % 8);
@@ -70,7 +71,7 @@ fn a_gif_keeps_gradients_on_average() {
         Picture { width: 96, height: 40, pixels: (0..96 * 40).map(pixel).collect() }
     };
     let frames: Vec<Picture> = (0..8).map(smooth).collect();
-    let bytes = encode(&frames, &[], MovingFormat::Gif, &CancelToken::new()).expect("encoded");
+    let bytes = encode(&frames, &[], AnimationFormat::Gif, &CancelToken::new()).expect("encoded");
     let shown = decoded(&bytes);
     assert_eq!(shown.len(), frames.len());
     let palette = ::gif::DecodeOptions::new().read_info(bytes.as_slice()).expect("GIF");
@@ -79,13 +80,13 @@ fn a_gif_keeps_gradients_on_average() {
         let distance = |color: &&[u8; 3]| {
             (0..3).map(|i| (i32::from(color[i]) - i32::from(pixel[i])).pow(2)).sum::<i32>()
         };
-        *palette.iter().min_by_key(distance).expect("colours")
+        *palette.iter().min_by_key(distance).expect("colors")
     };
     let block = |pixels: &[u8], x: usize, y: usize| {
         let at = |i: usize| 3 * ((4 * y + i / 4) * 96 + 4 * x + i % 4);
         [0, 1, 2].map(|channel| (0..16).map(|i| f64::from(pixels[at(i) + channel])).sum::<f64>() / 16.0)
     };
-    // Mean distance of the blocks' means, in levels.
+    // Mean distance of block means, in levels of 255.
     let off = |frame: &Picture, shown: &[u8]| {
         let blocks = (0..10).flat_map(|y| (0..24).map(move |x| (x, y)));
         let each = blocks.map(|(x, y)| {
@@ -101,9 +102,9 @@ fn a_gif_keeps_gradients_on_average() {
 }
 
 #[test]
-fn what_stays_in_place_is_the_same_in_each_frame_of_a_gif() {
+fn static_pixels_are_equal_in_all_gif_frames() {
     let frames = frames();
-    let shown = decoded(&bytes(MovingFormat::Gif));
+    let shown = decoded(&bytes(AnimationFormat::Gif));
     for (frame, image) in frames.iter().zip(&shown).skip(1) {
         for (i, pixel) in frame.pixels.iter().enumerate() {
             if *pixel == frames[0].pixels[i] {
@@ -114,32 +115,35 @@ fn what_stays_in_place_is_the_same_in_each_frame_of_a_gif() {
 }
 
 #[test]
-fn few_colours_stay_as_they_are() {
+fn few_colors_are_kept_exactly() {
     let pixels = (0..64).map(|i| [[1, 2, 3], [250, 128, 7], [77, 77, 78]][i % 3]).collect();
     let frame = Picture { width: 8, height: 8, pixels };
     let frames = vec![frame; 8];
-    let bytes = encode(&frames, &[], MovingFormat::Gif, &CancelToken::new()).expect("encoded");
+    let bytes = encode(&frames, &[], AnimationFormat::Gif, &CancelToken::new()).expect("encoded");
     assert!(decoded(&bytes).iter().all(|shown| shown == frames[0].pixels.as_flattened()));
 }
 
 #[test]
-fn what_a_format_cannot_hold_and_what_is_cancelled_is_no_file() {
+fn unsupported_and_cancelled_frames_are_errors() {
     let token = CancelToken::new();
     let wide = Picture { width: 70_000, height: 1, pixels: vec![[0; 3]; 70_000] };
-    let error = encode(&[wide], &[], MovingFormat::Gif, &token).expect_err("too wide").to_string();
-    assert!(error.contains("65535×65535; use .apng"), "{error}");
-    assert!(encode(&[], &[], MovingFormat::Gif, &token).is_err());
+    let error = encode(&[wide], &[], AnimationFormat::Gif, &token).expect_err("too wide");
+    assert!(matches!(error, OutputError::Animation { format: AnimationFormat::Gif, .. }), "{error}");
+    assert!(encode(&[], &[], AnimationFormat::Gif, &token).is_err());
     let odd = Picture { width: 2, height: 1, pixels: vec![[0; 3]; 2] };
-    assert!(encode(&[frame(0), odd], &[], MovingFormat::Apng, &token).is_err());
+    assert!(encode(&[frame(0), odd], &[], AnimationFormat::Apng, &token).is_err());
     token.cancel();
-    for format in [MovingFormat::Gif, MovingFormat::Apng] {
+    for format in [AnimationFormat::Gif, AnimationFormat::Apng] {
         assert!(matches!(encode(&frames(), &[], format, &token), Err(OutputError::Cancelled(_))));
     }
 }
 
 #[test]
-fn endings_tell_the_format() {
-    assert_eq!(MovingFormat::of(Path::new("a.GIF")), Some(MovingFormat::Gif));
-    assert_eq!(MovingFormat::of(Path::new("a.apng")), Some(MovingFormat::Apng));
-    assert_eq!((MovingFormat::of(Path::new("a.png")), MovingFormat::of(Path::new("gif"))), (None, None));
+fn extensions_select_the_animation_format() {
+    assert_eq!(AnimationFormat::from_path(Path::new("a.GIF")), Some(AnimationFormat::Gif));
+    assert_eq!(AnimationFormat::from_path(Path::new("a.apng")), Some(AnimationFormat::Apng));
+    assert_eq!(
+        (AnimationFormat::from_path(Path::new("a.png")), AnimationFormat::from_path(Path::new("gif"))),
+        (None, None)
+    );
 }

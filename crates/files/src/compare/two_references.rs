@@ -1,5 +1,6 @@
-//! The error against two noisy references. With independent noise a and b, a reference is the truth plus noise, and the mean of
-//! (x − r₁)(x − r₂) is that of (x − truth)²: no square contains the noise.
+//! Errors against two noisy references. A reference is the truth plus noise; if the noise of both is
+//! independent, the expectation of (x − r₁)(x − r₂) equals that of (x − truth)², without the variance of the
+//! noise.
 
 use super::Pair;
 use crate::film::RadianceImage;
@@ -10,16 +11,16 @@ fn luminance(color: DVec3) -> f64 {
     color.dot(LUMINANCE_WEIGHTS.as_dvec3())
 }
 
-/// Two references of one picture, made independently of each other.
+/// Two independently rendered references of the same image.
 #[derive(Clone, Debug)]
 pub struct TwoReferences {
     pair: Pair,
-    /// 1/(r² + 0.01) of their mean r, over the number of channels and pixels.
+    /// 1/(r² + 0.01) with the references' mean r, divided by the number of channels and pixels.
     weights: Vec<DVec3>,
 }
 
 impl TwoReferences {
-    /// The two pictures of the pair.
+    /// Creates references from a pair of images.
     pub fn new(pair: Pair) -> Self {
         let values = 3.0 * pair.a().pixels.len() as f64;
         let weight = |(a, b): (&Vec3, &Vec3)| {
@@ -30,21 +31,21 @@ impl TwoReferences {
         Self { pair, weights }
     }
 
-    /// The two pictures.
+    /// Both references.
     pub fn pair(&self) -> &Pair {
         &self.pair
     }
 
-    /// relMSE of a picture of the same size, unbiased whatever the noise of the references. It can be below 0.
+    /// relMSE of an image of the same size, unbiased by the noise of the references. Can be negative.
     pub fn error(&self, x: &RadianceImage) -> f64 {
         self.cross(x, x)
     }
 
-    /// The mean of (x − r)(y − r) relative to r². For two pictures by one method with independent noise, it is the square of
-    /// their common error, the bias.
+    /// Mean of (x − r)(y − r) relative to r². For two images rendered with the same method and independent
+    /// noise, this is the square of their common error, the bias.
     pub fn cross(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
-        let places = self.places().zip(x.pixels.iter().zip(&y.pixels));
-        let sum = places.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
+        let pixels = self.weighted_pixels().zip(x.pixels.iter().zip(&y.pixels));
+        let sum = pixels.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
             let (x, y) = (x.as_dvec3(), y.as_dvec3());
             sum + weight * ((x - a) * (y - b) + (x - b) * (y - a)) / 2.0
         });
@@ -53,27 +54,29 @@ impl TwoReferences {
 
     /// relMSE of one reference: the error that its noise would add if it were the only reference.
     pub fn noise(&self) -> f64 {
-        let sum = self.places().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
+        let sum =
+            self.weighted_pixels().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
         sum.element_sum() / 2.0
     }
 
-    /// Standard error of [`Self::error`] by the noise of the references: pixels are taken as independent, channels as one.
+    /// Standard error of [`Self::error`] due to the noise of the references, assuming independent pixels and
+    /// fully correlated channels.
     pub fn uncertainty(&self, x: &RadianceImage) -> f64 {
-        let variances = self.places().zip(&x.pixels).map(|((weight, a, b), x)| {
+        let variances = self.weighted_pixels().zip(&x.pixels).map(|((weight, a, b), x)| {
             let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);
-            let of = |channel: usize| {
-                // Add the variances of a·b and of (x − truth)(a + b); the variance of one reference is half of
-                // `between`.
+            let channel_deviation = |channel: usize| {
+                // Add the variances of a·b and of (x − truth)(a + b). The variance of one reference is half
+                // of `between`.
                 let variance = between[channel] * (between[channel] / 12.0 + from[channel] * from[channel]);
                 weight[channel] * variance.sqrt()
             };
-            let deviation = of(0) + of(1) + of(2);
+            let deviation = channel_deviation(0) + channel_deviation(1) + channel_deviation(2);
             deviation * deviation
         });
         variances.sum::<f64>().sqrt()
     }
 
-    /// Excess brightness of a picture, relative to the references' mean luminance.
+    /// Excess brightness of an image, relative to the references' mean luminance.
     pub fn brightness(&self, x: &RadianceImage) -> f64 {
         let sum: f64 = x.pixels.iter().map(|pixel| luminance(pixel.as_dvec3())).sum();
         sum / x.pixels.len() as f64 / self.mean_luminance() - 1.0
@@ -81,18 +84,19 @@ impl TwoReferences {
 
     /// Mean luminance of both references.
     pub fn mean_luminance(&self) -> f64 {
-        let sum: f64 = self.places().map(|(_, a, b)| luminance((a + b) / 2.0)).sum();
+        let sum: f64 = self.weighted_pixels().map(|(_, a, b)| luminance((a + b) / 2.0)).sum();
         sum / self.weights.len() as f64
     }
 
-    /// Standard error of [`Self::brightness`] by the noise of the references: pixels are taken as independent.
+    /// Standard error of [`Self::brightness`] due to the noise of the references, assuming independent
+    /// pixels.
     pub fn brightness_uncertainty(&self) -> f64 {
         let square = |x: f64| x * x;
-        let squares = self.places().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
+        let squares = self.weighted_pixels().map(|(_, a, b)| square(luminance((a - b) / 2.0)));
         squares.sum::<f64>().sqrt() / self.weights.len() as f64 / self.mean_luminance()
     }
 
-    fn places(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {
+    fn weighted_pixels(&self) -> impl Iterator<Item = (DVec3, DVec3, DVec3)> {
         let pixels = self.pair.a().pixels.iter().zip(&self.pair.b().pixels);
         self.weights.iter().zip(pixels).map(|(weight, (a, b))| (*weight, a.as_dvec3(), b.as_dvec3()))
     }
@@ -104,7 +108,7 @@ mod tests {
 
     use super::*;
 
-    /// Uniform in ±1, by a hash of its number.
+    /// Uniform in ±1, from a hash of the number.
     fn uniform(number: u32) -> f32 {
         let mixed = number.wrapping_mul(0x9e37_79b9) ^ (number.wrapping_mul(0x85eb_ca6b) >> 13);
         let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -113,8 +117,8 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// Grey of 0.5 with noise of ± `noise`, and an offset.
-    fn picture(seed: u32, noise: f32, offset: f32) -> RadianceImage {
+    /// Gray 0.5 with an offset and noise of ±`noise`.
+    fn test_image(seed: u32, noise: f32, offset: f32) -> RadianceImage {
         let value = |i: u32| 0.5 + offset + noise * uniform(seed.wrapping_mul(1 << 20) + i);
         let pixels = (0..SIDE * SIDE).map(|i| Vec3::new(value(3 * i), value(3 * i + 1), value(3 * i + 2)));
         RadianceImage { width: SIDE, height: SIDE, pixels: pixels.collect() }
@@ -122,42 +126,44 @@ mod tests {
 
     fn references(noise: f32) -> TwoReferences {
         let names = [Path::new("r1"), Path::new("r2")];
-        TwoReferences::new(Pair::new(names, picture(1, noise, 0.0), picture(2, noise, 0.0)).expect("a pair"))
+        TwoReferences::new(
+            Pair::new(names, test_image(1, noise, 0.0), test_image(2, noise, 0.0)).expect("a pair"),
+        )
     }
 
     /// 1/(0.5² + 0.01).
     const WEIGHT: f64 = 1.0 / 0.26;
 
     #[test]
-    fn equal_references_give_the_plain_error() {
+    fn equal_references_give_the_standard_relmse() {
         let references = references(0.0);
         assert_eq!(references.noise(), 0.0);
-        let error = references.error(&picture(3, 0.0, 0.1));
+        let error = references.error(&test_image(3, 0.0, 0.1));
         assert!((error - 0.01 * WEIGHT).abs() < 1e-6, "{error}");
-        assert_eq!(references.uncertainty(&picture(3, 0.0, 0.1)), 0.0);
+        assert_eq!(references.uncertainty(&test_image(3, 0.0, 0.1)), 0.0);
     }
 
     #[test]
-    fn the_references_noise_is_not_read_as_error_where_a_plain_error_would_have_it() {
+    fn reference_noise_does_not_bias_the_error() {
         let references = references(0.05);
         let noise = 0.05_f64.powi(2) / 3.0 * WEIGHT;
         assert!((references.noise() / noise - 1.0).abs() < 0.05, "{} against {noise}", references.noise());
-        let judged = picture(3, 0.01, 0.0);
+        let tested = test_image(3, 0.01, 0.0);
         let truth = 0.01_f64.powi(2) / 3.0 * WEIGHT;
-        let (error, uncertainty) = (references.error(&judged), references.uncertainty(&judged));
+        let (error, uncertainty) = (references.error(&tested), references.uncertainty(&tested));
         assert!((error - truth).abs() < 4.0 * uncertainty, "{error} ± {uncertainty}, not {truth}");
         assert!(uncertainty < 0.05 * noise, "{uncertainty}");
         let plain = super::super::linear::measure(
-            &Pair::new([Path::new("x"), Path::new("r")], judged, picture(1, 0.05, 0.0)).expect("a pair"),
+            &Pair::new([Path::new("x"), Path::new("r")], tested, test_image(1, 0.05, 0.0)).expect("a pair"),
         );
         assert!(plain.relmse > 20.0 * truth, "a single reference: {}", plain.relmse);
     }
 
     #[test]
-    fn pictures_with_independent_noise_have_their_bias_in_common() {
+    fn cross_error_of_independent_images_is_bias() {
         let references = references(0.02);
-        let cross = |offset| references.cross(&picture(5, 0.2, offset), &picture(6, 0.2, offset));
+        let cross = |offset| references.cross(&test_image(5, 0.2, offset), &test_image(6, 0.2, offset));
         assert!((cross(0.1) / (0.01 * WEIGHT) - 1.0).abs() < 0.1, "{}", cross(0.1));
-        assert!(cross(0.0).abs() < 0.04 * references.error(&picture(5, 0.2, 0.0)), "{}", cross(0.0));
+        assert!(cross(0.0).abs() < 0.04 * references.error(&test_image(5, 0.2, 0.0)), "{}", cross(0.0));
     }
 }
