@@ -36,7 +36,7 @@ pub(crate) struct WrittenFiles {
     files: HashMap<PathBuf, (Key, Content)>,
     /// Key of the scene's own image, if all its files contain it.
     pub(crate) own: Option<Key>,
-    /// Folders of this write, or of the images of a turntable so far, without temporary files of killed writers.
+    /// Folders of this write, or of the turntable so far, that have been cleared of temporary files from killed writers.
     sweep: FolderSweep,
 }
 

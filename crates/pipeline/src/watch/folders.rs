@@ -42,8 +42,8 @@ fn identity(folder: &Path) -> Option<Identity> {
     fs::metadata(folder).ok().map(|metadata| (metadata.dev(), metadata.ino()))
 }
 
-/// The watcher, unless its thread could not be started: then its handler, which shares `names`, is gone, and all that the watcher can
-/// do is panic, also when it is dropped.
+/// Returns the watcher unless its thread could not be started. Without a thread, its handler, which shares `names`, has
+/// been dropped, and every use of the watcher panics, including its drop.
 fn if_alive<W>(watcher: W, names: &Arc<Mutex<HashSet<OsString>>>) -> Option<W> {
     if Arc::strong_count(names) > 1 {
         return Some(watcher);
@@ -194,7 +194,7 @@ mod tests {
 
     use super::*;
 
-    /// As the watcher of a thread that was not started.
+    /// A watcher whose thread was not started.
     struct Dead;
 
     impl Drop for Dead {
