@@ -78,7 +78,7 @@ impl Console {
         match written {
             // A closed pipe is not an error: the reader has seen enough.
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-                *self.stdout_error.borrow_mut() = Some(error)
+                *self.stdout_error.borrow_mut() = Some(error);
             }
             Ok(()) | Err(_) => {}
         }

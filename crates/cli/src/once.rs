@@ -287,7 +287,7 @@ fn report_checkpoint(
     match news {
         CheckpointNews::Written { .. } => {}
         CheckpointNews::Failed { message } => {
-            warn(message, "use --checkpoint 0 to render without checkpoints")
+            warn(message, "use --checkpoint 0 to render without checkpoints");
         }
         CheckpointNews::Resumed { path, samples } => {
             say(format!("Resuming from {} at {samples} samples", path.display()));

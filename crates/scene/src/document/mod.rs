@@ -95,7 +95,7 @@ pub(super) fn named_files(text: &str, path: &Path) -> Vec<PathBuf> {
         for toml::KeyValue { key, value, .. } in table.iter() {
             match value.item() {
                 toml::TomlValue::String(name) if matches!(key, "file" | "orbiter") => {
-                    names.push(name.to_owned())
+                    names.push(name.to_owned());
                 }
                 toml::TomlValue::Table(inner) => gather(inner, names),
                 toml::TomlValue::Array(array) => {

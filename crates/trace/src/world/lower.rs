@@ -139,7 +139,7 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
 /// Material class of a mesh file's material. MTL illumination models 4, 6, 7 and 9 are glass, unless an opacity texture masks
 /// them. Materials with the physically based MTL extension are principled. Otherwise, models 3, 5 and 8 with a specular color are
 /// mirrors, or coats over a stronger diffuse color.
-enum FileKind<'a> {
+enum FileMaterialKind<'a> {
     Phong,
     Principled(&'a PhysicalMaterial),
     Coated,
@@ -147,34 +147,34 @@ enum FileKind<'a> {
     Glass,
 }
 
-fn kind(own: &FileMaterial) -> FileKind<'_> {
+fn kind(own: &FileMaterial) -> FileMaterialKind<'_> {
     match (own.illumination_model, &own.physical) {
-        (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileKind::Glass,
-        (_, Some(physical)) => FileKind::Principled(physical),
+        (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileMaterialKind::Glass,
+        (_, Some(physical)) => FileMaterialKind::Principled(physical),
         (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => {
             if own.is_coated() {
-                FileKind::Coated
+                FileMaterialKind::Coated
             } else {
-                FileKind::Mirror
+                FileMaterialKind::Mirror
             }
         }
-        (_, None) => FileKind::Phong,
+        (_, None) => FileMaterialKind::Phong,
     }
 }
 
 /// Whether a mesh file's material emits light.
 pub fn file_emits(own: &FileMaterial) -> bool {
     match kind(own) {
-        FileKind::Phong | FileKind::Principled(_) => own.emission != Vec3::ZERO,
-        FileKind::Mirror | FileKind::Coated | FileKind::Glass => false,
+        FileMaterialKind::Phong | FileMaterialKind::Principled(_) => own.emission != Vec3::ZERO,
+        FileMaterialKind::Mirror | FileMaterialKind::Coated | FileMaterialKind::Glass => false,
     }
 }
 
 /// Whether a mesh file's material is glass.
 pub fn file_is_glass(own: &FileMaterial) -> bool {
     match kind(own) {
-        FileKind::Glass => true,
-        FileKind::Phong | FileKind::Principled(_) | FileKind::Coated | FileKind::Mirror => false,
+        FileMaterialKind::Glass => true,
+        FileMaterialKind::Phong | FileMaterialKind::Principled(_) | FileMaterialKind::Coated | FileMaterialKind::Mirror => false,
     }
 }
 
@@ -216,16 +216,16 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 /// Converts a material of a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
-        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE)))),
-        (FileKind::Coated, _) => file_coated(images, own),
-        (FileKind::Glass, Some((ior, tint))) => {
+        (FileMaterialKind::Mirror, _) => Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE)))),
+        (FileMaterialKind::Coated, _) => file_coated(images, own),
+        (FileMaterialKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
             Bsdf::Dielectric(Dielectric::new(ior, tint).with_roughness(Number::Constant(roughness)))
         }
-        (FileKind::Principled(physical), _) => {
+        (FileMaterialKind::Principled(physical), _) => {
             return file_surface(images, own, file_principled(images, own, physical));
         }
-        (FileKind::Phong | FileKind::Glass, _) => return file_surface(images, own, file_phong(images, own)),
+        (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => return file_surface(images, own, file_phong(images, own)),
     };
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }

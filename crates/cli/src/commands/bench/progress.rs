@@ -169,7 +169,7 @@ impl BenchProgress {
     pub(super) fn written(&self, path: &Path, bytes: usize) {
         match self.format {
             ProgressFormat::Bar(..) | ProgressFormat::Plain => {
-                self.console.say(&format!("wrote {}", path.display()))
+                self.console.say(&format!("wrote {}", path.display()));
             }
             ProgressFormat::Json => {
                 json_line(&json!({ "event": "written", "path": path.to_string_lossy(), "bytes": bytes }));

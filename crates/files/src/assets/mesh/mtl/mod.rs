@@ -105,10 +105,10 @@ impl MtlLibrary {
         match statement {
             Statement::New(_) | Statement::Nothing => {}
             Statement::Color(color, value) => {
-                material.colors[color as usize] = Some(WithLine { value, line })
+                material.colors[color as usize] = Some(WithLine { value, line });
             }
             Statement::Number(number, value) => {
-                material.numbers[number as usize] = Some(WithLine { value, line })
+                material.numbers[number as usize] = Some(WithLine { value, line });
             }
             Statement::Illumination(value) => material.illumination = Some(WithLine { value, line }),
             Statement::Map(kind, mut map) => {

@@ -149,7 +149,7 @@ impl FaceReader {
                     }
                 }
                 (PropertyType::Scalar(scalar), Role::Value(index)) => {
-                    self.values[index] = numbers.float(scalar)?
+                    self.values[index] = numbers.float(scalar)?;
                 }
                 (_, Role::Corners | Role::Uvs | Role::Colors | Role::Value(_) | Role::Unused) => {
                     skip(numbers, kind)?;
