@@ -61,7 +61,7 @@ pub(super) const KEYMAP: &[Binding] = &[
         &[KeyPress::plain('z')],
         "z",
         Action::RenderRegionFirst,
-        "render a region first (drag, or z: the crosshair)",
+        "render a region first (drag; z: at the crosshair)",
         "",
     ),
     binding(
