@@ -192,8 +192,13 @@ fn model_scene_is_written_once() {
     ui.finish([30, 30, 200]);
     ui.key(KeyPress::special(KeyCode::Esc));
     assert!(ui.text().contains("c keep") && !ui.text().contains("o edit"), "{}", ui.text());
-    let kept =
-        KeptCamera { path: "assets/vase.toml".into(), is_new: true, is_own: false, of_model: true, edit: None };
+    let kept = KeptCamera {
+        path: "assets/vase.toml".into(),
+        is_new: true,
+        is_own: false,
+        of_model: true,
+        edit: None,
+    };
     let generation = ui.state.request.generation;
     ui.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     ui.key(KeyPress::special(KeyCode::Esc));

@@ -8,7 +8,9 @@ use crate::color::ColorDepth;
 use crate::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::fixtures::*;
 use crate::messages;
-use crate::pipeline::protocol::{self, CameraEdit, Command, KeptCamera, Picked, Section, ImagePosition, PickedObject, Writing};
+use crate::pipeline::protocol::{
+    self, CameraEdit, Command, ImagePosition, KeptCamera, Picked, PickedObject, Section, Writing,
+};
 use crate::pipeline::settings::Overrides;
 use crate::preview_kind::PreviewKind;
 use crate::scene::diagnostic::Severity;
