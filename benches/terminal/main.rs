@@ -23,7 +23,7 @@ use std::time::{Duration, Instant};
 use glimt::film::Picture;
 use glimt::pipeline::protocol::PreviewSize;
 use glimt::tui::ColorDepth;
-use glimt::tui::paint::{PacingAdvice, Fidelity, FrameTiming, Painter, advise};
+use glimt::tui::paint::{Fidelity, FrameTiming, PacingAdvice, Painter, advise};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;

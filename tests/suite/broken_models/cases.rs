@@ -39,7 +39,11 @@ pub(super) fn obj() -> Vec<Case> {
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 1 2\n".to_vec(),
             "a.obj:4: vertex -4 is out of range: there are 3, numbered from 1",
         ),
-        ("no vertices", b"f 1 2 3\n".to_vec(), "a.obj:1: vertex 1 is out of range: there are 0, numbered from 1"),
+        (
+            "no vertices",
+            b"f 1 2 3\n".to_vec(),
+            "a.obj:1: vertex 1 is out of range: there are 0, numbered from 1",
+        ),
         ("no faces", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), "a.obj: no usable face: the file has no faces"),
         (
             "vertices with words",

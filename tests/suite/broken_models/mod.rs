@@ -55,7 +55,11 @@ const EDITS: &[(&str, &str, &str)] = &[
         r#"4000000000"#,
         r#"bufferViews[0]: bytes 0 + 4000000000 exceed buffers[0], which has 44"#,
     ),
-    ("/bufferViews/0/byteStride", r#"4"#, r#"bufferViews[0]: invalid stride of 4 bytes for elements of 12 bytes"#),
+    (
+        "/bufferViews/0/byteStride",
+        r#"4"#,
+        r#"bufferViews[0]: invalid stride of 4 bytes for elements of 12 bytes"#,
+    ),
     ("/buffers/0/byteLength", r#"4000000000"#, r#"buffers[0]: it claims 4000000000 bytes but has 44"#),
     ("/buffers/0/uri", r#""/etc/passwd""#, r#"buffers[0]: "/etc/passwd" is not a relative URI"#),
     ("/buffers/0/uri", r#""data:;base64,%%%%""#, r#"invalid base64 byte"#),
@@ -202,7 +206,11 @@ fn glb_files() {
             "a.glb: GLB version 4294967295 is not supported; version 2 is required".to_owned(),
         ),
         ("no chunk", head.to_vec(), "a.glb: the JSON chunk is missing".to_owned()),
-        ("half a chunk header", file(head, &[own[..6].to_vec()]), "a.glb: the JSON chunk is missing".to_owned()),
+        (
+            "half a chunk header",
+            file(head, &[own[..6].to_vec()]),
+            "a.glb: the JSON chunk is missing".to_owned(),
+        ),
         ("no JSON", file(head, std::slice::from_ref(&rest)), "a.glb: the JSON chunk is missing".to_owned()),
         (
             "only an unknown chunk",

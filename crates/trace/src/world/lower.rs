@@ -174,7 +174,10 @@ pub fn file_emits(own: &FileMaterial) -> bool {
 pub fn file_is_glass(own: &FileMaterial) -> bool {
     match kind(own) {
         FileMaterialKind::Glass => true,
-        FileMaterialKind::Phong | FileMaterialKind::Principled(_) | FileMaterialKind::Coated | FileMaterialKind::Mirror => false,
+        FileMaterialKind::Phong
+        | FileMaterialKind::Principled(_)
+        | FileMaterialKind::Coated
+        | FileMaterialKind::Mirror => false,
     }
 }
 
@@ -216,7 +219,9 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 /// Converts a material of a mesh file. A highlight of strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
-        (FileMaterialKind::Mirror, _) => Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE)))),
+        (FileMaterialKind::Mirror, _) => {
+            Bsdf::Mirror(Mirror::Constant(Color::Constant(own.specular.min(Vec3::ONE))))
+        }
         (FileMaterialKind::Coated, _) => file_coated(images, own),
         (FileMaterialKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
@@ -225,7 +230,9 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
         (FileMaterialKind::Principled(physical), _) => {
             return file_surface(images, own, file_principled(images, own, physical));
         }
-        (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => return file_surface(images, own, file_phong(images, own)),
+        (FileMaterialKind::Phong | FileMaterialKind::Glass, _) => {
+            return file_surface(images, own, file_phong(images, own));
+        }
     };
     Material { bsdf, emission: Emission::NONE, normal_perturbation: None, opacity: file_opacity(images, own) }
 }
