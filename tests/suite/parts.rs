@@ -429,14 +429,14 @@ fn scheduler_scripts_are_valid() {
     let said = dir.expect("farm room.toml -o out.exr --shards 4 --engine slurm -- --sample 3", 2);
     assert_mentions(&said, &["`--`", "--sample"]);
     let said = dir.expect("farm none.toml -o out.exr --shards 4 --engine slurm", 2);
-    assert_mentions(&said, &["none.toml", &system_error(Errno::ENOENT)]);
+    assert_mentions(&said, &["error: none.toml"]);
 }
 
 #[test]
 fn memory_limit_rejects_large_renders() {
     let dir = room_dir();
     let said = dir.expect("room.toml --once -o a.png --width 9000 --height 9000 --memory 500MB", 1);
-    assert_mentions(&said, &["4.1", "477 MiB", "--memory"]);
+    assert_mentions(&said, &["GiB", "477 MiB", "--memory"]);
     assert!(!said.contains("render   "), "nothing is rendered: {said}");
     dir.expect("room.toml --once -o a.png --memory 500MB", 0);
     let photons = "--photons on --set photons.count=4000000";
