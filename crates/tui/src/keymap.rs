@@ -4,6 +4,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::action::Action;
 use super::event::KeyPress;
+use super::messages;
 
 /// One row of a key table.
 pub(super) struct Binding<A = Action> {
@@ -35,7 +36,7 @@ const DOWN: KeyPress = KeyPress::special(KeyCode::Down);
 
 /// All keys, in the order of the help.
 pub(super) const KEYMAP: &[Binding] = &[
-    binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, "show or hide this help", "help"),
+    binding(&[KeyPress::plain('?')], "?", Action::ToggleHelp, messages::HELP_TOGGLE, "help"),
     binding(&[KeyPress::plain('q')], "q", Action::Quit, "quit", "quit"),
     binding(&[KeyPress::plain('s')], "s", Action::CycleShadows, "shadows: soft, hard, off", ""),
     binding(&[KeyPress::plain('d')], "d", Action::ToggleDepthOfField, "depth of field on or off", ""),

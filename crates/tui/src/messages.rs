@@ -274,6 +274,8 @@ pub fn noise_target(share: &str) -> String {
     format!("── target: {share} per tile")
 }
 
+/// Help for `?`.
+pub const HELP_TOGGLE: &str = "show or hide this help";
 /// Help for the time of a stage.
 pub const HELP_STAGE_TIME: &str = "stage time (difference to the last render)";
 /// Help for the cost of sending a preview.

@@ -28,7 +28,7 @@ fn moved_camera_resets_without_writing() {
         (">".repeat(10), false),
     ] {
         terminal.press(&keys);
-        terminal.wait_for("camera moved (preview only). w: save image");
+        terminal.wait_for_message(messages::CAMERA_MOVED);
         terminal.wait_for("0 reset camera");
         wait_for_red(&terminal, &keys, |now| if is_more { now > red + 20 } else { now + 20 < red });
         terminal.wait_for("done");
@@ -48,7 +48,7 @@ fn saved_image_has_the_moved_camera() {
     terminal.press(">");
     terminal.wait_for_render(2);
     terminal.press("w");
-    terminal.wait_for("wrote scene.png");
+    terminal.wait_for_message(&messages::wrote("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--set", "camera.fov=42"]));
 }
 
@@ -59,10 +59,10 @@ fn saved_image_has_the_changed_exposure() {
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
     terminal.press("[");
-    terminal.wait_for("exposure −0.25");
+    terminal.wait_for_message(&messages::exposure("−0.25"));
     terminal.wait_for_render(1);
     terminal.press("]]");
-    terminal.wait_for("exposure +0.25");
+    terminal.wait_for_message(&messages::exposure("+0.25"));
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), own);
     terminal.press("w");

@@ -21,9 +21,9 @@ fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
 /// The value of a key in the file after these keys and `c`. Restores the file afterwards, and waits for its image.
 fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
-    terminal.wait_for("camera moved (preview only)");
+    terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.press("c");
-    terminal.wait_for("camera saved to scene.toml");
+    terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let kept = numbers(folder, key);
     let expected = folder.once(&[]);
     assert_ne!(expected, own, "{keys:?} shows");
@@ -113,15 +113,15 @@ fn reset_undoes_every_key() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
-    for (key, words) in [
-        ("s", "s hard"),
-        ("]", "exposure +0.25"),
-        ("l", "camera moved"),
-        ("<", "camera moved"),
-        ("v", "view normal (preview only)"),
+    for (key, message) in [
+        ("s", "s hard".to_owned()),
+        ("]", messages::exposure("+0.25")),
+        ("l", messages::CAMERA_MOVED.to_owned()),
+        ("<", messages::CAMERA_MOVED.to_owned()),
+        ("v", messages::view("normal")),
     ] {
         terminal.press(key);
-        terminal.wait_for(words);
+        terminal.wait_for_message(&message);
     }
     terminal.wait_for("done");
     fs::remove_file(folder.path("scene.png")).expect("removed");
@@ -146,9 +146,9 @@ fn kept_orbiter_becomes_position_and_look_at() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("+");
-    terminal.wait_for("camera moved (preview only)");
+    terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.press("c");
-    terminal.wait_for("camera saved to scene.toml");
+    terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     assert_eq!(numbers(&folder, "position").len(), 3);
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert!(written.contains("look_at = [") && !written.contains("orbiter"), "{written}");

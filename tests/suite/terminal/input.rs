@@ -20,7 +20,7 @@ fn key_after_a_burst_is_handled() {
     terminal.wait_for_render(1);
     // Nothing follows: the last key must not wait for more input.
     terminal.burst(UNBOUND.repeat(60_000) + "?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.burst(UNBOUND.repeat(60_000) + "q");
     assert_eq!(terminal.end(), 0);
 }
@@ -36,7 +36,7 @@ fn pasted_text_is_not_keys() {
     terminal.press("1~");
     terminal.wait_for_render(1);
     terminal.burst(format!("\x1b[200~{}\x1b[201~?", "q?".repeat(30_000)));
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }
@@ -48,7 +48,7 @@ fn long_paste_is_not_keys() {
     terminal.wait_for_render(1);
     // Each of these keys has an effect; the last two write the camera into the scene and quit.
     terminal.burst(format!("\x1b[200~{}\x1b[201~?", "h?vcq".repeat(300_000)));
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     assert_eq!(folder.bytes("scene.toml"), SCENE.as_bytes());
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
@@ -88,10 +88,10 @@ fn split_terminal_replies_are_not_keys() {
     terminal.press("0");
     terminal.wait_for(messages::NOTHING_TO_RESET);
     terminal.press("?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     // An escape character that nothing follows is the Escape key.
     terminal.press("\x1b");
-    terminal.wait("no help", |screen| !screen.contents().contains("show or hide this help"));
+    terminal.wait("no help", |screen| !screen.contents().contains(messages::HELP_TOGGLE));
     terminal.press("q");
     assert_eq!(terminal.end(), 0);
 }
@@ -109,7 +109,7 @@ fn unterminated_sequences_do_not_block_keys() {
     pause(2500);
     for (_folder, mut terminal) in terminals {
         terminal.press("?");
-        terminal.wait_for("show or hide this help");
+        terminal.wait_for_message(messages::HELP_TOGGLE);
         terminal.press("q");
         assert_eq!(terminal.end(), 0);
     }

@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt;
 
 use glimt::tui::messages;
 
-use super::mouse_and_editor::EDITOR;
+use super::mouse_and_editor::{EDITOR, editing};
 use super::pty::{Colors, Folder, SCENE, Terminal};
 
 /// A click on a cell, counted from 1.
@@ -52,7 +52,7 @@ fn crosshair_shows_all_facts() {
     terminal.press(&click(30, 10));
     terminal.wait_for("quad");
     terminal.press("e\r");
-    terminal.wait_for("phong board");
+    terminal.wait("the board", |screen| ["phong", "board"].iter().all(|it| screen.contents().contains(it)));
     assert!(!terminal.text().contains("apple"));
     terminal.press(&click(4, 4));
     terminal.wait_for("nothing at pixel");
@@ -65,20 +65,22 @@ fn focus_moves_to_the_crosshair_and_is_kept() {
     terminal.press("f");
     terminal.wait_for(messages::CLICK_TO_FOCUS);
     terminal.press("f");
-    terminal.wait_for("(preview only)");
-    let text = terminal.text();
-    let focus = text.split("focus at ").nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
+    let message = messages::focus_moved(0.0);
+    let (before, _) = message.split_once('0').expect("a distance");
+    terminal.wait_for(before);
+    let text = terminal.settled(|screen| screen.contents());
+    let focus = text.split(before).nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
     let depth: f64 = focus.parse().expect("a number");
     assert!((depth - 3.0).abs() < 0.01, "{depth}");
     // An earlier `w` would save the unfinished image.
     terminal.wait_for_render(2);
     terminal.press("w");
-    terminal.wait_for("wrote scene.png");
+    terminal.wait_for_message(&messages::wrote("scene.png"));
     let expected = folder.once(&["--set", &format!("camera.focus={focus}")]);
     assert_eq!(folder.bytes("scene.png"), expected);
     assert_ne!(expected, folder.once(&[]), "it shows");
     terminal.press("c");
-    terminal.wait_for("camera saved to scene.toml");
+    terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert_eq!(written, centred().replace("focus = 4.0", &format!("focus = {focus}")));
 }
@@ -106,7 +108,7 @@ fn editor_opens_at_the_clicked_object() {
     terminal.press("\r");
     terminal.wait_for("apple");
     terminal.press("o");
-    terminal.wait_for(&format!("editing scene.toml at +{}", line_of_ball()));
+    terminal.wait_for(&editing(line_of_ball()));
     terminal.press("\n");
     terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
 }

@@ -63,14 +63,14 @@ fn views_are_shown_and_saved_on_request() {
     let beauty = folder.bytes("scene.png");
 
     terminal.press("v");
-    terminal.wait_for("view normal (preview only)");
+    terminal.wait_for_message(&messages::view("normal"));
     terminal.wait_for_render(2);
     // The board faces the camera: (0, 0, 1) is shown as (n + 1)/2, without a tone curve.
     let board = vt100::Color::Rgb(128, 128, 255);
     terminal.wait("normals", |screen| cells(screen).filter(|cell| upper(cell) == Some(board)).count() > 100);
     assert_eq!(folder.bytes("scene.png"), beauty);
     terminal.press("w");
-    terminal.wait_for("wrote scene.png");
+    terminal.wait_for_message(&messages::wrote("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "normal"]));
 
     let views = [
@@ -125,7 +125,7 @@ fn paused_render_can_be_saved_and_resumed() {
     });
     terminal.press("w");
     terminal.wait("the picture on disk", |_| folder.path("scene.png").is_file());
-    terminal.wait_for("wrote scene.png");
+    terminal.wait_for_message(&messages::wrote("scene.png"));
     terminal.press(" ");
     terminal.wait_for("ETA");
     fs::remove_file(folder.path("scene.png")).expect("removed");
@@ -137,7 +137,7 @@ fn paused_render_can_be_saved_and_resumed() {
     terminal.wait_for(messages::NOT_RENDERING);
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("w");
-    terminal.wait_for("wrote scene.png");
+    terminal.wait_for_message(&messages::wrote("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
 }
 
@@ -148,13 +148,13 @@ fn help_and_errors_open_scroll_and_close() {
     terminal.wait_for_render(1);
     let gone = |text: &'static str| move |screen: &vt100::Screen| !screen.contents().contains(text);
     terminal.press("?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press("?");
-    terminal.wait("no help", gone("show or hide this help"));
+    terminal.wait("no help", gone(messages::HELP_TOGGLE));
     terminal.press("?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press(ESCAPE);
-    terminal.wait("no help", gone("show or hide this help"));
+    terminal.wait("no help", gone(messages::HELP_TOGGLE));
     terminal.press("e");
     terminal.wait_for(messages::NO_DIAGNOSTICS);
 

@@ -32,7 +32,8 @@ fn model_is_watched_and_kept_once() {
     terminal.press("c");
     terminal.wait_for(&messages::model_scene("wall.toml"));
     let text = fs::read_to_string(folder.path("wall.toml")).expect("a scene");
-    assert!(text.contains("[[mesh]]\nfile = \"wall.obj\"\n") && text.contains("[camera]"), "{text}");
+    let mesh = "[[mesh]]\nfile = \"wall.obj\"\n";
+    assert!(text.contains(mesh) && text.contains("[camera]"), "{text}");
     assert_eq!(fs::read_to_string(folder.path("wall.obj")).expect("the model"), wall(0.7));
     terminal.press("c");
     terminal.wait_for(&format!("wall.toml {}", glimt::pipeline::messages::ALREADY_EXISTS));

@@ -34,7 +34,7 @@ fn mouse_orbits_zooms_and_inspects() {
     terminal.wait_for_render(1);
     let before = red(&terminal);
     terminal.press(&(press(20, 10) + &drag(26, 10) + &drag(32, 10) + &release(32, 10)));
-    terminal.wait_for("camera moved (preview only)");
+    terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.wait("a narrower board", |screen| Colors::of(screen).red + 20 < before);
     terminal.press("0");
     terminal.wait("the board as before", |screen| Colors::of(screen).red == before);
@@ -81,7 +81,7 @@ fn kept_camera_becomes_the_scene_camera() {
     terminal.press(">");
     terminal.wait_for_render(2);
     terminal.press("c");
-    terminal.wait_for("camera saved to scene.toml");
+    terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
     terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
@@ -103,14 +103,19 @@ fn click_sets_the_focus() {
     terminal.press("f");
     terminal.wait_for(messages::CLICK_TO_FOCUS);
     terminal.press(&(press(20, 16) + &release(20, 16)));
-    terminal.wait_for("focus at 4 (preview only)");
+    terminal.wait_for_message(&messages::focus_moved(4.0));
     terminal.press("ff");
-    terminal.wait_for("focus at 4 (preview only)");
+    terminal.wait_for_message(&messages::focus_moved(4.0));
 }
 
 /// An editor that prints its arguments, reads a line of keys, and changes the scene.
 pub(super) const EDITOR: &str =
     "#!/bin/sh\nprintf 'editing %s at %s\\r\\n' \"$2\" \"$1\"\nread -r line\necho \"# $line\" >> \"$2\"\n";
+
+/// What [`EDITOR`] prints when it opens the scene at a line.
+pub(super) fn editing(line: usize) -> String {
+    ["editing", "scene.toml", "at", &format!("+{line}")].join(" ")
+}
 
 #[test]
 fn editor_borrows_the_terminal() {
@@ -124,7 +129,7 @@ fn editor_borrows_the_terminal() {
     folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = \"four\""));
     terminal.wait_for("scene.toml:4:11");
     terminal.press("o");
-    terminal.wait_for("editing scene.toml at +4");
+    terminal.wait_for(&editing(4));
     terminal.wait("the shell's screen", |screen| !screen.alternate_screen());
     terminal.press("hello q\n");
     terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
@@ -237,7 +242,7 @@ fn missing_editor_is_reported() {
     let mut terminal = folder.terminal_with(&[folder.program(), "scene.toml"], &variables);
     terminal.wait_for_render(1);
     terminal.press("o");
-    terminal.wait_for("there is no editor `no-such-editor`");
+    terminal.wait_for("`no-such-editor`");
     terminal.wait("glimt's screen", vt100::Screen::alternate_screen);
 }
 

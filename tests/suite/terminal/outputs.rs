@@ -4,6 +4,8 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::time::Duration;
 
+use glimt::tui::messages;
+
 use super::pty::{Folder, GREEN, RED, SCENE};
 
 /// A red image of one texel.
@@ -37,7 +39,7 @@ fn texture_named_like_the_image_is_kept() {
     terminal.press("\x1b");
     terminal.wait_for_color("red");
     terminal.press("w");
-    terminal.wait_for("nothing is written");
+    terminal.wait_for_message(messages::NOT_WRITTEN);
     assert_eq!(folder.bytes("scene.png"), before);
     folder
         .write("scene.toml", &textured("scene.png").replace("[render]", "[render]\noutput = \"other.png\""));
@@ -86,7 +88,7 @@ fn link_changed_while_rendering_is_noticed() {
     terminal.wait_for_color("red");
     terminal.wait_for("ETA");
     terminal.press("w");
-    terminal.wait_for("wrote out.ppm");
+    terminal.wait_for_message(&messages::wrote("out.ppm"));
     assert!(folder.path("first.ppm").is_file());
     fs::remove_file(folder.path("out.ppm")).expect("removed");
     symlink("paint.ppm", folder.path("out.ppm")).expect("a link");
@@ -106,7 +108,7 @@ fn own_writes_do_not_trigger_renders() {
         terminal.wait_for_render(1);
         for _ in 0..3 {
             terminal.press("w");
-            terminal.wait_for("wrote a.png, b.ppm");
+            terminal.wait_for_message(&messages::wrote("a.png, b.ppm"));
         }
         wait_a_while();
         terminal.wait_for_render(1);

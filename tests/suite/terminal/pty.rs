@@ -321,6 +321,12 @@ impl Terminal {
         self.wait(text, |screen| screen.contents().contains(text));
     }
 
+    /// Waits for a message of the front end, which may be cut off.
+    #[track_caller]
+    pub fn wait_for_message(&self, message: &str) {
+        self.wait(message, |screen| shows(screen, message));
+    }
+
     /// Waits until a render has a sample of every pixel.
     #[track_caller]
     pub fn wait_for_coverage(&self) {
@@ -386,6 +392,13 @@ impl Drop for Terminal {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Whether the screen shows the beginning of a message.
+pub fn shows(screen: &vt100::Screen, message: &str) -> bool {
+    let text = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
+    let start: String = message.chars().take(30).collect();
+    text.contains(start.trim_end())
 }
 
 fn size(columns: u16, rows: u16) -> PtySize {

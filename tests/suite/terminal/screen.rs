@@ -3,6 +3,7 @@
 use glimt::tui::messages;
 
 use super::pty::{Colors, Folder, SCENE, Terminal};
+use crate::test_dir::assert_mentions;
 
 const TAB: &str = "\t";
 const ESCAPE: &str = "\x1b";
@@ -47,13 +48,13 @@ fn help_scrolls_in_small_windows() {
     terminal.wait_for_render(1);
     resized(&mut terminal, 60, 12);
     terminal.press("?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.wait_for("j k scroll");
     for (forth, back) in [("j", "k"), ("\x1b[B", "\x1b[A"), (PAGE_DOWN, "\x1b[5~")] {
         terminal.press(forth);
-        terminal.wait("further lines", |screen| !screen.contents().contains("show or hide this help"));
+        terminal.wait("more lines", |screen| !screen.contents().contains(messages::HELP_TOGGLE));
         terminal.press(back);
-        terminal.wait_for("show or hide this help");
+        terminal.wait_for_message(messages::HELP_TOGGLE);
     }
     terminal.press(&PAGE_DOWN.repeat(9));
     terminal.wait_for(messages::HELP_STAGE_TIME);
@@ -96,7 +97,7 @@ fn small_windows_show_preview_errors_and_keys() {
         terminal.wait_for("broken");
         terminal.wait_for("scene.toml:4:11");
         terminal.press("?");
-        terminal.wait_for("show or hide");
+        terminal.wait_for(&messages::HELP_TOGGLE[..12]);
         terminal.press("?");
         terminal.press(ESCAPE);
         terminal.wait("the picture", |screen| Colors::of(screen).red == red);
@@ -150,7 +151,9 @@ fn quit_leaves_one_line() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("q");
-    assert_eq!(terminal.end_saying("wrote scene.png: 64×48, 4 samples, "), 0);
+    assert_eq!(terminal.code(), 0);
+    assert_mentions(&terminal.last_lines(), &["scene.png", "64×48", "4 samples"]);
+    terminal.end();
 }
 
 #[test]

@@ -28,12 +28,12 @@ fn wheel_scrolls_only_the_help() {
     terminal.wait_for_render(1);
     terminal.resize(60, 12);
     terminal.press("?");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.wait_for("j k scroll");
     terminal.press("\x1b[<65;20;6M");
-    terminal.wait("further lines", |screen| !screen.contents().contains("show or hide this help"));
+    terminal.wait("more lines", |screen| !screen.contents().contains(messages::HELP_TOGGLE));
     terminal.press("\x1b[<64;20;6M");
-    terminal.wait_for("show or hide this help");
+    terminal.wait_for_message(messages::HELP_TOGGLE);
     terminal.press("?0");
     terminal.wait_for(messages::NOTHING_TO_RESET);
 }
@@ -74,9 +74,10 @@ fn ctrl_l_redraws_the_screen() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    terminal.scribble("\x1b[10;5Hanother program was here");
-    terminal.wait_for("another program was here");
+    let text = "written by another program";
+    terminal.scribble(&format!("\x1b[10;5H{text}"));
+    terminal.wait_for(text);
     terminal.press("\x0c");
-    terminal.wait("the text is gone", |screen| !screen.contents().contains("another program was here"));
+    terminal.wait("the text is gone", |screen| !screen.contents().contains(text));
     terminal.wait_for_color("red");
 }

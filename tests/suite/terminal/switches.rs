@@ -96,7 +96,7 @@ fn digits_choose_views_in_the_open_list() {
         text.lines().any(|line| line.contains("✓ done") && line.contains("view specular"))
     });
     terminal.press("w");
-    terminal.wait_for("wrote scene.png");
+    terminal.wait_for_message(&messages::wrote("scene.png"));
     assert_eq!(folder.bytes("scene.png"), folder.once(&["--view", "specular"]));
     terminal.wait("no list", |screen| !screen.contents().contains("barycentric"));
     terminal.press("2e");
