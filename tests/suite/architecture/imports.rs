@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn crate_names_the_children_of_a_single_module_crate() {
+    fn crate_names_single_module_children() {
         let modules = modules(&[
             ("a/lib.rs", "mod b;\nmod c;\n"),
             ("a/b.rs", "use crate::c::Thing;\n"),

@@ -24,9 +24,9 @@ use std::path::PathBuf;
 use random::FuzzRandom;
 use seeds::{Seed, assets, scenes};
 
-/// FileKind of the changed file.
+/// FuzzInput of the changed file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum FileKind {
+enum FuzzInput {
     Scene,
     Asset,
 }
@@ -34,7 +34,7 @@ enum FileKind {
 /// One file to check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Case {
-    kind: FileKind,
+    kind: FuzzInput,
     seed: u64,
     number: u64,
 }
@@ -60,8 +60,8 @@ impl Corpus {
     /// The changed file of a case, named like its original.
     fn make(&self, case: Case) -> Seed {
         let seeds = match case.kind {
-            FileKind::Scene => &self.scenes,
-            FileKind::Asset => &self.assets,
+            FuzzInput::Scene => &self.scenes,
+            FuzzInput::Asset => &self.assets,
         };
         let mut random = FuzzRandom::new(case.seed ^ (case.kind as u64) << 32, case.number);
         let seed = random.pick(seeds);
@@ -102,12 +102,12 @@ fn settle(failures: &[(Case, String)]) {
 
 #[test]
 fn changed_scenes_are_checked_or_rejected() {
-    settle(&worker::check_all(FileKind::Scene, seed(), counts()[0]));
+    settle(&worker::check_all(FuzzInput::Scene, seed(), counts()[0]));
 }
 
 #[test]
 fn changed_assets_are_checked_or_rejected() {
-    settle(&worker::check_all(FileKind::Asset, seed(), counts()[1]));
+    settle(&worker::check_all(FuzzInput::Asset, seed(), counts()[1]));
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn check_exits_with_0_or_2() {
     let [_, _, count] = counts();
     settle(
         &[
-            program::check_all(FileKind::Scene, seed(), count),
-            program::check_all(FileKind::Asset, seed(), count),
+            program::check_all(FuzzInput::Scene, seed(), count),
+            program::check_all(FuzzInput::Asset, seed(), count),
         ]
         .concat(),
     );
@@ -127,7 +127,7 @@ fn same_seed_gives_the_same_files() {
     let (one, other) = (Corpus::new(), Corpus::new());
     let mut changed = 0;
     for number in 0..100 {
-        for kind in [FileKind::Scene, FileKind::Asset] {
+        for kind in [FuzzInput::Scene, FuzzInput::Asset] {
             let case = Case { kind, seed: 3, number };
             assert_eq!(one.make(case), other.make(case), "{case}");
             changed += usize::from(one.make(case) != one.make(Case { seed: 4, ..case }));

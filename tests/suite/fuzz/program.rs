@@ -4,11 +4,11 @@ use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
 
 use super::worker::{AT_MOST, CaseDir, TRIES, harmful};
-use super::{Case, Corpus, FileKind};
+use super::{Case, Corpus, FuzzInput};
 use crate::test_dir::PROGRAM;
 
 /// The failed cases of a kind, with the reason for each.
-pub(super) fn check_all(kind: FileKind, seed: u64, count: u64) -> Vec<(Case, String)> {
+pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
     let dir = CaseDir::new();
     let material = Corpus::new();
     let cases = (0..count).map(|number| Case { kind, seed, number });

@@ -14,7 +14,7 @@ use glimt::scene::report::{Style, render};
 use nix::sys::resource::{Resource, setrlimit};
 
 use super::seeds::{Seed, root};
-use super::{Case, Corpus, FileKind};
+use super::{Case, Corpus, FuzzInput};
 
 /// Time limit for a case.
 pub(super) const AT_MOST: Duration = Duration::from_secs(2);
@@ -39,7 +39,7 @@ const WORKERS: u64 = 2;
 const ORDER: &str = "GLIMT_FUZZ_WORKER";
 
 /// The failed cases of a kind, with the reason for each.
-pub(super) fn check_all(kind: FileKind, seed: u64, count: u64) -> Vec<(Case, String)> {
+pub(super) fn check_all(kind: FuzzInput, seed: u64, count: u64) -> Vec<(Case, String)> {
     let failures = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
         for worker in 0..WORKERS {
@@ -133,7 +133,7 @@ fn next_result(lines: &Receiver<String>) -> Result<(), String> {
 fn worker() {
     let Ok(order) = std::env::var(ORDER) else { return };
     let words: Vec<&str> = order.split(' ').collect();
-    let kind = if words[0] == "Scene" { FileKind::Scene } else { FileKind::Asset };
+    let kind = if words[0] == "Scene" { FuzzInput::Scene } else { FuzzInput::Asset };
     let [seed, from, to] = [1, 2, 3].map(|word| words[word].parse().expect("a number"));
     setrlimit(Resource::RLIMIT_AS, ADDRESS_BYTES, ADDRESS_BYTES).expect("a limit");
     let dir = CaseDir::new();
@@ -161,7 +161,7 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 fn listen_to_panics(dir: &CaseDir) {
     let _ = check(
         &dir.place_case(
-            Case { kind: FileKind::Asset, seed: 0, number: 0 },
+            Case { kind: FuzzInput::Asset, seed: 0, number: 0 },
             &Seed { file: "case.obj".to_owned(), bytes: b"v".to_vec() },
         ),
         &[],
@@ -239,7 +239,7 @@ impl CaseDir {
             return folder.join(&made.file);
         }
         std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
-        if case.kind == FileKind::Asset {
+        if case.kind == FuzzInput::Asset {
             if made.file != "case.mtl" {
                 std::fs::write(folder.join("case.mtl"), MTL).expect("written");
             }

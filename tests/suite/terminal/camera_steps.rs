@@ -131,7 +131,7 @@ fn reset_undoes_every_key() {
         fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own)
     });
     let words = ["s soft", "v beauty", "done"];
-    terminal.wait("the toggles as before", |screen| {
+    terminal.wait("the earlier toggles", |screen| {
         let text = screen.contents();
         words.iter().all(|it| text.contains(it)) && !text.contains("camera moved")
     });

@@ -127,7 +127,7 @@ fn actual_pixels_center_on_the_click() {
         .wait("no board", |screen| screen.contents().contains("1:1") && Colors::of(screen).red < before / 2);
     terminal.press("x");
     // A few edge cells may keep a value that is equally close.
-    terminal.wait("the picture as before", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
+    terminal.wait("the earlier preview", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn mouse_orbits_zooms_and_inspects() {
     terminal.wait_for_message(messages::CAMERA_MOVED);
     terminal.wait("a narrower board", |screen| Colors::of(screen).red + 20 < before);
     terminal.press("0");
-    terminal.wait("the board as before", |screen| Colors::of(screen).red == before);
+    terminal.wait("the earlier board", |screen| Colors::of(screen).red == before);
     terminal.press("\x1b[<64;20;10M\x1b[<64;20;10M");
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 20);
     terminal.press("0");
@@ -89,7 +89,7 @@ fn kept_camera_becomes_the_scene_camera() {
     // Its own write is not an edit: the stage table still shows the reused stages. A key without another effect closes
     // the message that covers it.
     terminal.press("??");
-    terminal.wait("nothing rendered anew", |screen| screen.contents().contains(messages::CACHED));
+    terminal.wait("no new render", |screen| screen.contents().contains(messages::CACHED));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
     terminal.wait_for_color("green");
 }
@@ -283,7 +283,7 @@ fn zoom_shows_actual_pixels() {
     // The middle of the board fills the preview.
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 100);
     terminal.press("x");
-    terminal.wait("the picture as before", |screen| {
+    terminal.wait("the earlier preview", |screen| {
         Colors::of(screen).red == before && !screen.contents().contains("1:1")
     });
 }
