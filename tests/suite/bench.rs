@@ -79,7 +79,7 @@ fn bench_measures_a_scene_end_to_end() {
         );
     }
     assert!(
-        stdout.contains("whitted: set-up") && stdout.contains("\n  BIAS: "),
+        stdout.contains("whitted: setup") && stdout.contains("\n  BIAS: "),
         "ambient light replaces indirect light: {stdout}"
     );
     assert!(stdout.lines().all(|line| line.chars().count() <= 80 || line.contains("set-up")), "{stdout}");
@@ -212,7 +212,7 @@ fn references_set_the_size_and_one_warns() {
     let (_, stderr) = bench(&dir, &format!("{line} --csv r8.exr"), 2);
     assert_eq!(
         stderr,
-        "error: cannot write r8.exr: it is a reference of this call; name another file with --csv FILE\n"
+        "error: cannot write r8.exr: it is one of the references; choose another file with --csv FILE\n"
     );
     let (_, stderr) = bench(&dir, "box.toml --reference none.exr", 2);
     assert_mentions(&stderr, &["none.exr", &system_error(Errno::ENOENT)]);
@@ -229,8 +229,8 @@ fn outputs_never_replace_inputs_or_each_other() {
     symlink("box.toml", dir.path("link.csv")).expect("a link");
     symlink("skin.ppm", dir.path("skin.csv")).expect("a link");
     for (line, facts) in [
-        ("box.toml --csv box.toml", &["box.toml", "scene", "--csv FILE"][..]),
-        ("box.toml --csv link.csv", &["link.csv", "scene", "--csv FILE"]),
+        ("box.toml --csv box.toml", &["box.toml", "scenes", "--csv FILE"][..]),
+        ("box.toml --csv link.csv", &["link.csv", "scenes", "--csv FILE"]),
         ("box.toml --csv a.json --json ./a.json", &["./a.json", "--csv", "--json FILE"]),
         ("box.toml --plot a.png", &["a.png", "SVG", ".svg"]),
         ("skin.toml --force --csv skin.csv", &["skin.csv", "skin.toml"]),

@@ -156,7 +156,7 @@ fn threshold_decides_the_exit_code() {
     );
     let (object, stderr) = json(&dir, "a.png b.png --max-relmse .4", 1);
     assert_eq!(object["is_within"], false);
-    assert_eq!(stderr, "error: relMSE is 0.421550, above the 0.4 of --max-relmse\n");
+    assert_eq!(stderr, "error: relMSE 0.421550 is above --max-relmse 0.4\n");
     let copy = dir.bytes("b.png");
     dir.write("copy.png", copy);
     let (object, stderr) = json(&dir, "copy.png b.png --max-relmse 0", 0);

@@ -110,7 +110,7 @@ fn layers_need_an_exr_output() {
         ("--once -o a.png --layers all", "a.png"),
         ("--once -o a.exr -o b.hdr --layers all", "b.hdr"),
         ("--once --layers depth", "room.png"),
-        ("--once -o a.exr --layers depth,colour", "there is no layer \"colour\"; there are all, albedo"),
+        ("--once -o a.exr --layers depth,colour", "unknown layer \"colour\"; expected all, albedo"),
         ("--once -o a.exr --layers depth --view normal", "view beauty"),
         ("--once -o a.part --shard 1/2 --layers depth", "exclude each other"),
         ("-o a.exr --layers depth", "--layers needs --once"),

@@ -364,7 +364,7 @@ fn unprintable_names_are_not_suggested() {
         let output = dir.glimt("new").arg(OsStr::from_bytes(&picture)).output().expect("it runs");
         let said = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!(output.status.code(), Some(2), "{said}");
-        assert!(said.starts_with("error: ") && said.trim_end().ends_with(".toml"), "{said}");
+        assert!(said.starts_with("error: ") && said.contains(" .toml "), "{said}");
         assert!(!said.contains("glimt "), "{said}");
     }
 }
@@ -481,12 +481,12 @@ fn signal_is_reported() {
         (
             "INT",
             130,
-            "ended by SIGINT: ball.png.checkpoint has what was rendered; --resume goes on from it\n",
+            "terminated by SIGINT: progress saved in ball.png.checkpoint; use --resume to continue\n",
         ),
         (
             "TERM",
             143,
-            "ended by SIGTERM: ball.png.checkpoint has what was rendered; --resume goes on from it\n",
+            "terminated by SIGTERM: progress saved in ball.png.checkpoint; use --resume to continue\n",
         ),
         ("HUP", 129, ""),
     ] {
@@ -510,7 +510,7 @@ fn signal_is_reported() {
             assert!(killed.expect("kill runs").success());
             assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name} {progress}");
             let last = said().lines().last().map_or(String::new(), |line| format!("{line}\n"));
-            assert_eq!(said().matches("ended by").count(), usize::from(!words.is_empty()), "{}", said());
+            assert_eq!(said().matches("terminated by").count(), usize::from(!words.is_empty()), "{}", said());
             assert!(words.is_empty() || last == words, "{}", said());
         }
     }
@@ -531,7 +531,7 @@ fn new_writes_to_stdout_for_a_dash() {
     assert_eq!(output.status.code(), Some(0));
     assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
     let said = String::from_utf8(output.stderr).expect("UTF-8");
-    let words = "note: glimt.schema.json is not written: glimt schema > glimt.schema.json writes it beside the scene\n";
+    let words = "note: write glimt.schema.json next to the scene with: glimt schema > glimt.schema.json\n";
     assert_eq!(said, words);
 }
 

@@ -509,7 +509,7 @@ fn help_fits_and_names_every_option() {
     let text = String::from_utf8(dir.run("--help").stdout).expect("UTF-8");
     let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
     let formats =
-        "The ending chooses the format: png, exr, hdr, jpg, ppm, webp; with --turntable also gif, apng.";
+        "The extension chooses the format: png, exr, hdr, jpg, ppm, webp; with --turntable also gif, apng.";
     assert!(words.contains(formats), "{text}");
     for option in [
         "--once",

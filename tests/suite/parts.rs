@@ -3,6 +3,7 @@
 
 use std::fs;
 
+use glimt::scene::SCENE_NOT_FOUND;
 use nix::errno::Errno;
 
 use crate::test_dir::{TestDir, assert_mentions, mentions, system_error};
