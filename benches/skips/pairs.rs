@@ -1,5 +1,7 @@
 //! Scenes with and without a feature that they do not use.
 
+use glimt::pipeline::protocol::reasons;
+
 use super::row::SceneFiles;
 
 /// An image without and with a feature that the scene does not use.
@@ -66,11 +68,11 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     let unused = "[textures.t]\nfile = \"a.ppm\"\nfilter = \"mipmap\"\n[materials.unused]\ndiffuse = { texture = \"t\" }\nnormal_map = \"t\"\n";
     vec![
         FeaturePair {
-            skipped: Some(("photons", glimt::pipeline::protocol::reasons::NOT_USED_BY_PATH)),
+            skipped: Some(("photons", reasons::NOT_USED_BY_PATH)),
             ..pair("photons, with path", path(), path().by("--photons on"))
         },
         FeaturePair {
-            skipped: Some(("photons", "max_depth")),
+            skipped: Some(("photons", reasons::TOO_FEW_BOUNCES)),
             ..pair(
                 "photons, direct light only",
                 scene("max_depth = 1", "", "", POINT),
@@ -78,7 +80,7 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
             )
         },
         FeaturePair {
-            skipped: Some(("photons", "does not enable")),
+            skipped: Some(("photons", reasons::PHOTONS_OFF)),
             ..pair(
                 "photons that are not enabled",
                 plain(),
@@ -91,11 +93,11 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
         pair("shadow samples of point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
         pair("shadows, with path", path().by("--shadows off"), path().by("--shadows soft")),
         FeaturePair {
-            skipped: Some(("textures", "names a texture")),
+            skipped: Some(("textures", reasons::NO_TEXTURES)),
             ..pair("a texture that nothing uses", plain(), with(texture))
         },
         FeaturePair {
-            skipped: Some(("textures", "names a texture")),
+            skipped: Some(("textures", reasons::NO_TEXTURES)),
             ..pair("a textured material that no shape uses", plain(), with(unused))
         },
         pair(

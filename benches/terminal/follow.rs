@@ -14,7 +14,7 @@ const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
 const WAYS: [(&str, &[&str]); 5] = [
     ("half blocks", &["--preview", "halfblock", "--color", "truecolor"]),
     ("sextants", &["--preview", "sextant", "--color", "truecolor"]),
-    ("256 colours", &["--preview", "halfblock", "--color", "256"]),
+    ("256 colors", &["--preview", "halfblock", "--color", "256"]),
     ("kitty", &["--preview", "kitty", "--color", "truecolor"]),
     ("sixel", &["--preview", "sixel", "--color", "truecolor"]),
 ];

@@ -51,7 +51,7 @@ fn refused(dir: &TestDir, scene: &str, words: &[&str]) -> String {
 /// here.
 fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
     Some(match what {
-        "missing" => &["there is no", "file"],
+        "missing" => &["not found"],
         "folder" => {
             fs::create_dir(path).expect("a folder");
             &["is a folder, not a"]

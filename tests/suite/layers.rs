@@ -112,7 +112,7 @@ fn layers_need_an_exr_output() {
         ("--once --layers depth", "room.png"),
         ("--once -o a.exr --layers depth,colour", "unknown layer \"colour\"; expected all, albedo"),
         ("--once -o a.exr --layers depth --view normal", "view beauty"),
-        ("--once -o a.part --shard 1/2 --layers depth", "exclude each other"),
+        ("--once -o a.part --shard 1/2 --layers depth", "--shard"),
         ("-o a.exr --layers depth", "--layers needs --once"),
     ] {
         let stderr = dir.expect(&format!("room.toml {options}"), 2);

@@ -190,7 +190,7 @@ fn missing_mesh_exits_2() {
 fn call_errors_do_not_point_into_the_scene() {
     let dir = TestDir::new();
     let stderr = dir.expect("ball.toml --once --crop 0,0,33,1 --progress none", 2);
-    assert!(stderr.starts_with("error: --crop 0,0,33,1") && !stderr.contains("-->"), "{stderr}");
+    assert!(stderr.starts_with("error: `--crop 0,0,33,1`") && !stderr.contains("-->"), "{stderr}");
     let stderr = dir.expect("ball.toml --once --bit-depth 16 -o a.png -o a.jpg --progress none", 2);
     assert!(stderr.contains("JPEG") && stderr.contains("--> a.jpg\n"), "{stderr}");
     dir.write("ball.toml", SCENE.replace("[render]", "[render]\noutput = \"own.jpg\""));

@@ -179,32 +179,32 @@ struct WriteLog {
 }
 
 impl Writes {
-    fn log(&self) -> MutexGuard<'_, WriteLog> {
+    fn state(&self) -> MutexGuard<'_, WriteLog> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Records a write command of the user.
     fn start(&self) {
-        let mut log = self.log();
+        let mut log = self.state();
         log.lines.clear();
         log.has_written = false;
     }
 
     /// Records that the UI has exited.
     fn leave(&self) {
-        self.log().has_left = true;
+        self.state().has_left = true;
     }
 
     fn has_written(&self) -> bool {
-        self.log().has_written
+        self.state().has_written
     }
 
     fn is_last_stage(&self) -> bool {
-        self.log().is_last_stage
+        self.state().is_last_stage
     }
 
     fn record(&self, event: &Event) {
-        let mut log = self.log();
+        let mut log = self.state();
         let has_left = log.has_left;
         match event {
             Event::Written { path, .. } => {
@@ -255,12 +255,12 @@ impl Writes {
 
     /// The checkpoint written after the UI exited, or the reason why there is none.
     fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
-        self.log().checkpoint.clone()
+        self.state().checkpoint.clone()
     }
 
     /// Lines about images that the UI has not reported: those after it exited, or all since an unanswered write command.
     fn unreported(&self, is_unanswered: bool, has_ended: bool) -> Vec<String> {
-        let log = self.log();
+        let log = self.state();
         let unknown = log.lines.iter().filter(|(has_left, _)| is_unanswered || *has_left);
         let mut lines: Vec<String> = unknown.map(|(_, line)| line.clone()).collect();
         if !has_ended && (is_unanswered || log.is_last_stage) || is_unanswered && lines.is_empty() {

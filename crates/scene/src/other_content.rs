@@ -4,9 +4,11 @@ use std::io::Read;
 use std::path::Path;
 
 use super::diagnostic::Diagnostic;
-use super::read::NEW_SCENE_HELP;
 use super::sanitize::visible;
 use crate::system::file::{self, PART_MARK};
+
+/// Hint after errors about files that are not scenes.
+pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 
 /// Whether a file has the extension of a scene.
 pub(super) fn may_be_scene(found: &Path) -> bool {

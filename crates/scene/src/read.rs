@@ -8,15 +8,13 @@ use super::diagnostic::{Diagnostic, SourceSpan};
 use super::document::is_mesh;
 use super::keys::endings::MESHES;
 use super::nearest::nearest;
-use super::other_content::{OtherContent, may_be_scene, other_content};
+use super::other_content::{NEW_SCENE_HELP, OtherContent, may_be_scene, other_content};
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, MODEL_NOT_FOUND, SCENE_NOT_FOUND};
 use crate::system::describe_error;
 use crate::system::file::{self, FileKind};
 use crate::system::folder;
 
-/// Hint after errors about files that are not scenes.
-pub(super) const NEW_SCENE_HELP: &str = "`glimt new FILE` writes a scene to start from";
 /// Message for binary files.
 const NOT_TEXT: &str = "this is a binary file, not a scene";
 /// Message for meshes given in place of a scene.

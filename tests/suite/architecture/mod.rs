@@ -141,7 +141,7 @@ const LIBM: [&str; 34] = [
 ];
 
 /// Modules that do not affect an image: the screen, progress, and the asset generator, which uses the crate `libm`.
-const EXEMPT: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/pace.rs"];
+const EXEMPT: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/work_rate.rs"];
 
 /// The module whose functions are compiled for named instruction sets, some of which have `mul_add`.
 const SIMD: &str = "accel/wide_bvh/simd";

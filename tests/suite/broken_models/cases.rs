@@ -232,7 +232,7 @@ pub(super) fn ply() -> Vec<Case> {
         ("no faces", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 0\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n".to_vec(), "a.ply: no usable face: the file has no faces"),
         ("a property before any element", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n".to_vec(), "a.ply:3: a property before the first element"),
         ("an element without a count", b"ply\nformat ascii 1.0\nelement vertex\nend_header\n".to_vec(), "a.ply:3: incomplete or unknown statement \"element\""),
-        ("a list with a fractional length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list is a whole number"),
+        ("a list with a fractional length", b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list float int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".to_vec(), "a.ply:8: the length of a list must have an integer type"),
         ("bytes", every_byte(), "a.ply:1: this is a binary file in another format"),
     ]
 }
@@ -291,7 +291,7 @@ pub(super) fn mtl() -> Vec<Case> {
             b"newmtl m\nKd nan 1 1\n".to_vec(),
             "a.mtl:2: expected three finite numbers after `Kd`",
         ),
-        ("a negative colour", b"newmtl m\nKd -1 1 1\n".to_vec(), ""),
+        ("a negative color", b"newmtl m\nKd -1 1 1\n".to_vec(), ""),
         (
             "a word as an exponent",
             b"newmtl m\nNs shiny\n".to_vec(),

@@ -118,7 +118,7 @@ fn two_sided_emission_with_half_opacity() {
 fn vertex_colors_multiply_metal_and_base_color() {
     // In sRGB, 188 is 0.5029 in linear light.
     let linear = f64::from(((188.0_f32 / 255.0 + 0.055) / 1.055).powf(2.4));
-    let grey = |material: Material| square(material, Some([188; 3]));
+    let gray = |material: Material| square(material, Some([188; 3]));
     for (name, colored, equal) in [
         ("metal", metal(0.8, 0.5, 0.0), metal(0.8 * linear as f32, 0.5, 0.0)),
         ("plastic", plastic(0.6, 0.4), plastic(0.6 * linear as f32, 0.4)),
@@ -131,7 +131,7 @@ fn vertex_colors_multiply_metal_and_base_color() {
             (square(colored.clone(), None).value() / exact - 1.0).abs() > 0.05,
             "{name}: the color matters"
         );
-        for (integrator, build) in each(&grey(colored)) {
+        for (integrator, build) in each(&gray(colored)) {
             let (mean, error) = mean_and_error(&build.values(16, 64));
             let most = 3.5 * error + 1e-3 * exact;
             assert!((mean - exact).abs() < most, "{name} with {integrator}: {mean} ± {error}, not {exact}");

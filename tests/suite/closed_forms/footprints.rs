@@ -35,14 +35,14 @@ fn floor(filter: TextureFilter) -> Build {
     build.quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), kind)
 }
 
-fn greys(build: &Build) -> Vec<f64> {
+fn grays(build: &Build) -> Vec<f64> {
     build.picture(1, 7).into_iter().map(|color| color.x).collect()
 }
 
 #[test]
 fn distant_board_is_gray_after_one_sample() {
     // From 60 units away, a pixel of 40°/16 is at least 2.6 units wide.
-    let seen = |filter| greys(&floor(filter).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16));
+    let seen = |filter| grays(&floor(filter).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16));
     let off = |values: &[f64]| values.iter().map(|x| (x - 0.5).abs()).fold(0.0, f64::max);
     let mipmapped = seen(TextureFilter::Mipmap);
     assert!(off(&mipmapped) < 0.01, "{}", off(&mipmapped));
@@ -77,8 +77,8 @@ fn distant_boards_are_gray_for_every_key() {
             .quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), material(board))
             .sphere(v(0.0, 90.0, 0.0), 1.0, matte(0.5))
             .pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16);
-        for grey in greys(&build) {
-            assert!((grey - 0.5).abs() < 0.01, "{what}: {grey}");
+        for gray in grays(&build) {
+            assert!((gray - 0.5).abs() < 0.01, "{what}: {gray}");
         }
     }
 }
@@ -99,7 +99,7 @@ fn mip_levels_fade_with_distance() {
 
 #[test]
 fn near_texture_shows_its_texels() {
-    let seen = |filter| greys(&floor(filter).pictured(v(0.3, 0.4, -50.0), v(0.4, 0.0, -50.2), 3.0, 16, 16));
+    let seen = |filter| grays(&floor(filter).pictured(v(0.3, 0.4, -50.0), v(0.4, 0.0, -50.2), 3.0, 16, 16));
     assert_eq!(seen(TextureFilter::Mipmap), seen(TextureFilter::Bilinear));
 }
 
@@ -144,8 +144,8 @@ fn flat_mirror_keeps_the_mip_level() {
         build.pictured(eye, v(0.1, 0.2, -5.0), 50.0, 24, 24).picture(1, 3)
     };
     let (mirrored, plain) = (picture(true), picture(false));
-    let grey = |picture: &[DVec3]| picture.iter().filter(|color| color.x > 0.05 && color.x < 0.95).count();
-    assert!(grey(&plain) > 100, "intermediate levels are used");
+    let gray = |picture: &[DVec3]| picture.iter().filter(|color| color.x > 0.05 && color.x < 0.95).count();
+    assert!(gray(&plain) > 100, "intermediate levels are used");
     for (a, b) in mirrored.iter().zip(&plain) {
         assert!((*a - *b).abs().max_element() < 5e-3, "{a} {b}");
     }
@@ -172,8 +172,8 @@ fn mirror_ball_matches_its_smooth_mesh() {
 #[test]
 fn views_use_the_same_mip_level() {
     let far = floor(TextureFilter::Mipmap).pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 8, 8);
-    let albedo = greys(&far.clone().viewed(View::Albedo));
-    assert_eq!(albedo, greys(&far));
+    let albedo = grays(&far.clone().viewed(View::Albedo));
+    assert_eq!(albedo, grays(&far));
 }
 
 #[test]

@@ -403,7 +403,7 @@ fn colored_walls_multiply_their_colors() {
     let pixels: Vec<DVec3> = (0..32).map(|seed| build.picture(512, seed)[0]).collect();
     for axis in 0..3 {
         let values: Vec<f64> = pixels.iter().map(|pixel| pixel[axis]).collect();
-        assert_near("a colour", &values, 1.0 / (1.0 - f64::from(colors[axis])), 4e-3);
+        assert_near("a color", &values, 1.0 / (1.0 - f64::from(colors[axis])), 4e-3);
     }
 }
 

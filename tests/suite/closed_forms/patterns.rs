@@ -14,7 +14,7 @@ use super::scenes::{AS_IT_IS, Build, emitter, phong};
 use super::{assert_close, lambert, mean_and_error, v};
 
 /// Adds a gray texture with these values, rows from the top.
-fn greys(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
+fn grays(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
     let rows: Vec<Vec<Vec3>> = rows.iter().map(|row| row.iter().map(|x| Vec3::splat(*x)).collect()).collect();
     let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
     build.texture(&rows, filter, Wrap::Repeat, repeat)
@@ -54,7 +54,7 @@ fn by_squares(scale: f64) -> f64 {
 #[test]
 fn checkered_quad_light_sums_its_squares() {
     let mut lit = at_origin();
-    let texture = greys(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+    let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let lit = lit.quad(CORNER, U, V, shining(texture, 2.0));
     assert_irradiance("whitted", &lit, by_squares(2.0));
     assert_irradiance("path", &by_paths(&lit), by_squares(2.0));
@@ -78,7 +78,7 @@ fn checkered_mesh_light_sums_its_squares() {
             ..TriangleMesh::default()
         };
         let mut lit = at_origin();
-        let texture = greys(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+        let texture = grays(&mut lit, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
         let placed = [v(mirror, 1.0, 1.0), AS_IT_IS[1], AS_IT_IS[2]];
         let lit = lit.mesh(mesh, placed, shining(texture, 1.0));
         assert_irradiance("whitted", &lit, by_squares(1.0));
@@ -125,7 +125,7 @@ fn every_shape_emits_its_texture_in_place() {
     for (name, shape) in shapes {
         let mut lit = at_origin();
         let rows: [&[f32]; 3] = [&[4.0, 0.0, 1.0], &[0.0, 2.0, 0.5], &[3.0, 0.2, 0.0]];
-        let texture = greys(&mut lit, &rows, TextureFilter::Bilinear, Vec2::new(2.0, 3.0));
+        let texture = grays(&mut lit, &rows, TextureFilter::Bilinear, Vec2::new(2.0, 3.0));
         let lit = lit.shape(shape, shining(texture, 1.0));
         let exact = 0.7 * by_directions(&lit) / PI;
         assert!(exact > 0.01, "{name} is too dim");
@@ -143,11 +143,11 @@ fn constant_emission_texture_equals_its_color() {
     let plain = at_origin().quad(CORNER, U, V, emitter(3.0));
     for filter in [TextureFilter::Nearest, TextureFilter::Bilinear, TextureFilter::Mipmap] {
         let mut lit = at_origin();
-        let texture = greys(&mut lit, &[&[0.75, 0.75, 0.75][..]; 3], filter, Vec2::new(7.0, 0.3));
+        let texture = grays(&mut lit, &[&[0.75, 0.75, 0.75][..]; 3], filter, Vec2::new(7.0, 0.3));
         let lit = lit.quad(CORNER, U, V, shining(texture, 4.0));
         for (lit, plain) in [(lit.clone(), plain.clone()), (by_paths(&lit), by_paths(&plain))] {
             for (value, exact) in lit.values(16, 8).into_iter().zip(plain.values(16, 8)) {
-                assert_close("as the colour", value, exact);
+                assert_close("as the color", value, exact);
             }
             // The camera sees the same radiance.
             let seen = |build: Build| build.seen(v(0.1, 0.0, 0.1), CORNER + U * 0.5 + V * 0.5).value();
@@ -159,7 +159,7 @@ fn constant_emission_texture_equals_its_color() {
 #[test]
 fn black_emission_texture_emits_nothing() {
     let mut lit = at_origin();
-    let texture = greys(&mut lit, &[&[0.0]], TextureFilter::Nearest, Vec2::ONE);
+    let texture = grays(&mut lit, &[&[0.0]], TextureFilter::Nearest, Vec2::ONE);
     assert!(lit.quad(CORNER, U, V, shining(texture, 4.0)).world().lights.is_empty());
 }
 
@@ -171,7 +171,7 @@ fn light_power_follows_the_mean_of_its_texture() {
         bounds.map(|bounds| bounds.power).sum::<f64>()
     };
     let mut patterned = at_origin();
-    let texture = greys(&mut patterned, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+    let texture = grays(&mut patterned, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let patterned = patterned.quad(CORNER, U, V, shining(texture, 2.0));
     let plain = at_origin().quad(CORNER, U, V, emitter(2.0 * 2.25));
     assert_close("power", strength(&patterned), strength(&plain));
@@ -181,7 +181,7 @@ fn light_power_follows_the_mean_of_its_texture() {
 #[test]
 fn sampled_lights_keep_their_textures() {
     let mut build = at_origin();
-    let texture = greys(&mut build, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
+    let texture = grays(&mut build, &CHECKER, TextureFilter::Nearest, Vec2::ONE);
     let cells = 7_u32;
     let mut expected = 0.0;
     for cell in 0..cells * cells {

@@ -317,9 +317,9 @@ pub fn plain(kind: MaterialKind) -> Material {
 }
 
 pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {
-    let grey = |x| ColorSource::Constant(Vec3::splat(x));
+    let gray = |x| ColorSource::Constant(Vec3::splat(x));
     let kind =
-        MaterialKind::Phong { diffuse: grey(diffuse), specular: grey(specular), shininess, ambient: None };
+        MaterialKind::Phong { diffuse: gray(diffuse), specular: gray(specular), shininess, ambient: None };
     Material { emission: EmissionSource::constant(Vec3::splat(emission)), ..plain(kind) }
 }
 

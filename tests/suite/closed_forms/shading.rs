@@ -98,12 +98,12 @@ fn emission_is_one_sided_at_any_depth() {
 const RED: Vec3 = Vec3::new(1.0, 0.0, 0.0);
 const GREEN: Vec3 = Vec3::new(0.0, 1.0, 0.0);
 const BLUE: Vec3 = Vec3::new(0.0, 0.0, 1.0);
-const GREY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
+const GRAY: Vec3 = Vec3::new(0.5, 0.5, 0.5);
 
 /// A material whose diffuse color, under ambient light 1, is the image red green blue gray.
 fn pictured(filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
-    let texture = build.texture(&[&[RED, GREEN], &[BLUE, GREY]], filter, wrap, repeat);
+    let texture = build.texture(&[&[RED, GREEN], &[BLUE, GRAY]], filter, wrap, repeat);
     let mut kind = phong(0.0, 0.0, 1.0, 0.0);
     if let MaterialKind::Phong { diffuse, .. } = &mut kind.kind {
         *diffuse = ColorSource::Texture(texture);
@@ -121,12 +121,12 @@ fn texture_on_a_quad_is_upright_along_v() {
     };
     let nearest = |place| at(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE, place);
     assert_eq!(nearest((0.2, 0.1)), BLUE);
-    assert_eq!(nearest((0.9, 0.4)), GREY);
+    assert_eq!(nearest((0.9, 0.4)), GRAY);
     assert_eq!(nearest((0.1, 0.6)), RED);
     assert_eq!(nearest((0.6, 0.9)), GREEN);
     // Three tiles across, two up: (.2, .1)·(3, 2) = (.6, .2), (.5, .85)·(3, 2) = (1.5, 1.7) → (.5, .7).
     let tiled = |place| at(TextureFilter::Nearest, Wrap::Repeat, Vec2::new(3.0, 2.0), place);
-    assert_eq!(tiled((0.2, 0.1)), GREY);
+    assert_eq!(tiled((0.2, 0.1)), GRAY);
     assert_eq!(tiled((0.52, 0.85)), GREEN);
     // Mirrored, the second tile runs backwards: 1.56 → .44 and 1.7 → .3; clamped both are 1.
     let place = (0.52, 0.85);
@@ -134,7 +134,7 @@ fn texture_on_a_quad_is_upright_along_v() {
     assert_eq!(at(TextureFilter::Nearest, Wrap::Clamp, Vec2::new(3.0, 2.0), place), GREEN);
     // Bilinear in the middle is the mean of all texels; at a texel's center, the texel.
     let smooth = |place| at(TextureFilter::Bilinear, Wrap::Clamp, Vec2::ONE, place);
-    let mean = (RED + GREEN + BLUE + GREY) / 4.0;
+    let mean = (RED + GREEN + BLUE + GRAY) / 4.0;
     assert!((smooth((0.5, 0.5)) - mean).length() < 1e-5);
     assert!((smooth((0.25, 0.25)) - BLUE).length() < 1e-5);
     assert!((smooth((0.5, 0.75)) - (RED + GREEN) / 2.0).length() < 1e-5);
@@ -148,7 +148,7 @@ fn texel_borders_belong_to_the_next_texel() {
     let world = square.world();
     let bsdf = &world.materials[0].bsdf;
     let at = |u, w| bsdf.albedo(&TexturePoint::sharp(glimt::math::DVec2::new(u, w)), &mut 0);
-    assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GREY, RED, GREEN]);
+    assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GRAY, RED, GREEN]);
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn sphere_texture_coordinates() {
         assert_close("v", uv.y, w);
         let color = match (u < 0.5, w < 0.5) {
             (true, true) => BLUE,
-            (false, true) => GREY,
+            (false, true) => GRAY,
             (true, false) => RED,
             (false, false) => GREEN,
         };

@@ -50,7 +50,7 @@ fn materials(texture: usize) -> Vec<(&'static str, Material)> {
     let emission = EmissionSource { texture: Some(texture), ..EmissionSource::constant(Vec3::ONE) };
     let bump = Some(Bump { texture, channel: None, scale: 0.2 });
     vec![
-        ("a colour", Material { kind: colored, ..matte(0.5) }),
+        ("a color", Material { kind: colored, ..matte(0.5) }),
         ("a number", rough),
         ("emission", Material { emission, ..matte(0.5) }),
         ("opacity", Material { opacity: OpacitySource { value: number(), cutoff: 0.0 }, ..matte(0.5) }),

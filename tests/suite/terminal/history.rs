@@ -87,7 +87,7 @@ fn history_shows_images_and_their_changes() {
     terminal.press("N");
     terminal.wait_for(&messages::render_of(2, 3));
     terminal.wait("its change", |screen| {
-        words(screen).contains("after materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]")
+        words(screen).contains("materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]")
     });
     terminal.press(&click(newest));
     terminal.wait_for(messages::NEWEST_RENDER);

@@ -14,13 +14,13 @@ fn click(column: u16, row: u16) -> String {
 }
 
 /// The scene with a named ball in front of the middle of the board.
-fn centred() -> String {
+fn centered() -> String {
     SCENE.replace("center = [0.5, 0.2, 0.8]", "name = \"apple\"\ncenter = [0, 0, 0.8]")
 }
 
 /// The line of the ball in the scene, from 1.
 fn line_of_ball() -> usize {
-    centred().lines().position(|line| line == "[[sphere]]").expect("a ball") + 1
+    centered().lines().position(|line| line == "[[sphere]]").expect("a ball") + 1
 }
 
 fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal {
@@ -38,7 +38,7 @@ fn terminal(folder: &Folder, text: &str, variables: &[(&str, &str)]) -> Terminal
 #[test]
 fn crosshair_shows_all_facts() {
     let folder = Folder::new();
-    let mut terminal = terminal(&folder, &centred(), &[]);
+    let mut terminal = terminal(&folder, &centered(), &[]);
     terminal.press("\r");
     let place = format!("scene.toml:{}", line_of_ball());
     for words in
@@ -61,7 +61,7 @@ fn crosshair_shows_all_facts() {
 #[test]
 fn focus_moves_to_the_crosshair_and_is_kept() {
     let folder = Folder::new();
-    let mut terminal = terminal(&folder, &centred(), &[]);
+    let mut terminal = terminal(&folder, &centered(), &[]);
     terminal.press("f");
     terminal.wait_for(messages::CLICK_TO_FOCUS);
     terminal.press("f");
@@ -82,13 +82,13 @@ fn focus_moves_to_the_crosshair_and_is_kept() {
     terminal.press("c");
     terminal.wait_for_message(&messages::camera_saved("scene.toml"));
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
-    assert_eq!(written, centred().replace("focus = 4.0", &format!("focus = {focus}")));
+    assert_eq!(written, centered().replace("focus = 4.0", &format!("focus = {focus}")));
 }
 
 #[test]
 fn pinhole_has_no_focus() {
     let folder = Folder::new();
-    let mut terminal = terminal(&folder, &centred().replace("aperture = 0.2\n", ""), &[]);
+    let mut terminal = terminal(&folder, &centered().replace("aperture = 0.2\n", ""), &[]);
     terminal.press("ff");
     terminal.wait_for(messages::PINHOLE);
     terminal.press("0");
@@ -104,7 +104,7 @@ fn editor_opens_at_the_clicked_object() {
     fs::set_permissions(folder.path("vi"), fs::Permissions::from_mode(0o755)).expect("permitted");
     let editor = folder.path("vi");
     let variables = [("VISUAL", ""), ("EDITOR", editor.to_str().expect("a name"))];
-    let mut terminal = terminal(&folder, &centred(), &variables);
+    let mut terminal = terminal(&folder, &centered(), &variables);
     terminal.press("\r");
     terminal.wait_for("apple");
     terminal.press("o");

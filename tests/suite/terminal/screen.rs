@@ -2,7 +2,7 @@
 
 use glimt::tui::messages;
 
-use super::pty::{Colors, Folder, SCENE, Terminal};
+use super::pty::{Colors, Folder, SCENE, Terminal, shows};
 use crate::test_dir::assert_mentions;
 
 const TAB: &str = "\t";
@@ -57,9 +57,9 @@ fn help_scrolls_in_small_windows() {
         terminal.wait_for_message(messages::HELP_TOGGLE);
     }
     terminal.press(&PAGE_DOWN.repeat(9));
-    terminal.wait_for(messages::HELP_STAGE_TIME);
+    terminal.wait_for_message(messages::HELP_STAGE_TIME);
     terminal.press(ESCAPE);
-    terminal.wait("no help", |screen| !screen.contents().contains(messages::HELP_STAGE_TIME));
+    terminal.wait("no help", |screen| !shows(screen, messages::HELP_STAGE_TIME));
 }
 
 #[test]

@@ -84,9 +84,9 @@ fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
 /// Writes the mesh and the texture with small changes.
 fn save_assets(folder: &Folder, dice: &mut Dice) {
     let top = 0.5 + dice.below(8) as f32 / 10.0;
-    let grey = 100 + dice.below(100);
+    let gray = 100 + dice.below(100);
     save(folder, dice, "step.obj", &format!("v -1.5 0 0\nv -0.6 0 0\nv -1 {top} -0.2\nf 1 2 3\n"));
-    let tiles = format!("P3\n2 2\n255\n{grey} 200 200 40 40 60\n40 40 60 {grey} 200 200\n");
+    let tiles = format!("P3\n2 2\n255\n{gray} 200 200 40 40 60\n40 40 60 {gray} 200 200\n");
     save(folder, dice, "tiles.ppm", &tiles);
 }
 

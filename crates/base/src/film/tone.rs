@@ -136,17 +136,17 @@ mod tests {
         ToneMapping { curve, ..Default::default() }
     }
 
-    fn grey(curve: Tonemap, value: f32) -> f32 {
+    fn gray(curve: Tonemap, value: f32) -> f32 {
         tone(curve).apply(Vec3::splat(value)).y
     }
 
     #[test]
     fn curves_are_monotonic_in_gray() {
         for &curve in Tonemap::ALL {
-            let mut before = grey(curve, 0.0);
+            let mut before = gray(curve, 0.0);
             assert!(before.abs() < 1e-6, "{curve:?} takes black to {before}");
             for step in -200..=200 {
-                let now = grey(curve, (step as f32 / 10.0).exp2());
+                let now = gray(curve, (step as f32 / 10.0).exp2());
                 assert!(now >= before - 1e-6 && now <= 1.0, "{curve:?} at 2^{}: {now}", step as f32 / 10.0);
                 before = now;
             }
@@ -156,15 +156,15 @@ mod tests {
 
     #[test]
     fn curves_have_known_values() {
-        assert_eq!(grey(Tonemap::None, 0.25), 0.25);
-        assert!((grey(Tonemap::Reinhard, 1.0) - 0.5).abs() < 1e-6);
-        assert!((grey(Tonemap::Reinhard, 3.0) - 0.75).abs() < 1e-6);
+        assert_eq!(gray(Tonemap::None, 0.25), 0.25);
+        assert!((gray(Tonemap::Reinhard, 1.0) - 0.5).abs() < 1e-6);
+        assert!((gray(Tonemap::Reinhard, 3.0) - 0.75).abs() < 1e-6);
         // Reinhard works on luminance: pure red of radiance 1 has a luminance of 0.2126.
         let red = tone(Tonemap::Reinhard).apply(Vec3::X);
         assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
-        assert!((grey(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
+        assert!((gray(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
         // Middle gray is the sigmoid's pivot, ½ on a display with gamma 2.2.
-        assert!((grey(Tonemap::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
+        assert!((gray(Tonemap::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
     }
 
     #[test]

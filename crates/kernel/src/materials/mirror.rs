@@ -60,15 +60,15 @@ mod tests {
     #[test]
     fn tint_scales_schlick_metals_but_not_eta_k() {
         let (at, half) = (TexturePoint::sharp(DVec2::ZERO), Some(Vec3::splat(0.5)));
-        let grey = |mirror: &Mirror, cosine: f32, tint| mirror.reflectance(cosine, tint, &at, &mut 0).x;
+        let gray = |mirror: &Mirror, cosine: f32, tint| mirror.reflectance(cosine, tint, &at, &mut 0).x;
         let color = |reflectance: f32| Color::Constant(Vec3::splat(reflectance));
         let even = Mirror::Constant(color(0.8));
-        assert_eq!([grey(&even, 0.1, None), grey(&even, 0.1, half)], [0.8, 0.4]);
+        assert_eq!([gray(&even, 0.1, None), gray(&even, 0.1, half)], [0.8, 0.4]);
         // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ with F0 = 0.4.
         let metal = Mirror::Conductor(ConductorFresnel::Schlick(color(0.8)));
-        assert!((grey(&metal, 0.5, half) - (0.4 + 0.6 / 32.0)).abs() < 1e-6);
+        assert!((gray(&metal, 0.5, half) - (0.4 + 0.6 / 32.0)).abs() < 1e-6);
         let index = Mirror::Conductor(ConductorFresnel::Index { eta: color(0.2), k: color(3.9) });
-        assert_eq!(grey(&index, 0.5, half), grey(&index, 0.5, None));
+        assert_eq!(gray(&index, 0.5, half), gray(&index, 0.5, None));
     }
 
     #[test]

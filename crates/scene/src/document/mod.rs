@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use super::description::{Camera, Environment, Light, Scene};
 use super::keys::limits;
-use super::read::NEW_SCENE_HELP;
+use super::other_content::NEW_SCENE_HELP;
 use super::source::SceneText;
 use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
 use crate::math::Vec3;

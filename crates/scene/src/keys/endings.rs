@@ -4,17 +4,19 @@
 pub const IMAGES: &[&str] = &["png", "exr", "ppm", "hdr", "jpg", "jpeg", "webp"];
 
 /// Image formats that glimt reads, followed by containers of numbered images.
-const READ: [&str; 14] =
-    ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "tga", "bmp", "hdr", "exr", "webp", "glb", "gltf"];
+const READ: [&str; 15] = [
+    "png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "pfm", "tga", "bmp", "hdr", "exr", "webp", "glb",
+    "gltf",
+];
 
 /// Files that may be textures: images and containers of images.
 pub const TEXTURES: &[&str] = &READ;
 
 /// Image files, the first part of [`TEXTURES`].
-pub const MAPS: &[&str] = READ.split_at(12).0;
+pub const MAPS: &[&str] = READ.split_at(13).0;
 
 /// Containers of numbered images and parts, the rest of [`TEXTURES`].
-pub const GLTF: &[&str] = READ.split_at(12).1;
+pub const GLTF: &[&str] = READ.split_at(13).1;
 
 /// Mesh formats.
 pub const MESHES: &[&str] = &["obj", "off", "ply", "stl", "glb", "gltf"];

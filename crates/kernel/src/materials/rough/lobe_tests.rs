@@ -393,12 +393,12 @@ pub fn check_values<R: RoughRow>(
 }
 
 /// Checks that values, pdfs and samples of a surface do not depend on the other lanes.
-pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
-    check_neighbours_lit::<R>(points, LitFrom::Mirrored);
+pub fn check_neighbors<R: RoughRow>(points: &[R::Point]) {
+    check_neighbors_lit::<R>(points, LitFrom::Mirrored);
 }
 
-/// [`check_neighbours`] with another kind of light.
-pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
+/// [`check_neighbors`] with another kind of light.
+pub fn check_neighbors_lit<R: RoughRow>(points: &[R::Point], lit: LitFrom) {
     check_shown_lobes::<R>(points, lit);
     let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
     let mut next = random(31);

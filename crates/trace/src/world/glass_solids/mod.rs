@@ -212,10 +212,10 @@ impl PartGroups {
             *borders.entry([one.min(other), one.max(other)]).or_insert(0.0) +=
                 if seam.disagrees { -length } else { length };
         }
-        let mut neighbours = vec![Vec::new(); roots.len()];
+        let mut neighbors = vec![Vec::new(); roots.len()];
         for ([one, other], agreed) in borders.into_iter().filter(|([one, other], _)| one != other) {
-            neighbours[one as usize].push((other, agreed < 0.0));
-            neighbours[other as usize].push((one, agreed < 0.0));
+            neighbors[one as usize].push((other, agreed < 0.0));
+            neighbors[other as usize].push((one, agreed < 0.0));
         }
         // Propagate orientations from each solid's first part to its neighbors.
         let mut flips = vec![None; roots.len()];
@@ -226,7 +226,7 @@ impl PartGroups {
             flips[first] = Some(false);
             let mut pending = vec![(first, false)];
             while let Some((part, is_flipped)) = pending.pop() {
-                for &(next, disagrees) in &neighbours[part] {
+                for &(next, disagrees) in &neighbors[part] {
                     let own = &mut flips[next as usize];
                     if own.is_none() {
                         *own = Some(is_flipped != disagrees);

@@ -4,7 +4,7 @@ use super::super::parsed::alpha_ignored;
 use super::super::text::expected;
 use super::super::{AssetError, MeshSource};
 use super::vertex::Vertices;
-use super::words::{Words, integer, number};
+use super::words::{Words, integer, number, too_few};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// Statements between two polls of the cancel token.
@@ -219,11 +219,6 @@ pub(super) fn excess_words(line: usize) -> String {
 
 pub(super) fn free_form(line: usize, keyword: &str) -> String {
     format!("line {line}: free-form curves and surfaces (`{keyword}`) are not supported and are skipped")
-}
-
-/// Reason to reject a statement with too few numbers.
-pub(super) fn too_few(wanted: usize, what: &str, found: usize) -> String {
-    format!("expected {wanted} {what}, found {found}")
 }
 
 /// Byte offset of a face.

@@ -3,9 +3,10 @@ use super::super::assemble::NO_FACES;
 use super::super::parsed::alpha_ignored;
 use super::super::text::expected;
 use super::statements::{
-    CORNER_FORM, attribute_missing, excess_words, free_form, invalid_smoothing, out_of_range, too_few,
+    CORNER_FORM, attribute_missing, excess_words, free_form, invalid_smoothing, out_of_range,
 };
 use super::vertex::{NONFINITE_COLOR, WEIGHT_OR_COLOR, ZERO_WEIGHT};
+use super::words::too_few;
 use super::*;
 use crate::assets::mesh::load;
 use crate::assets::{Dropped, rejection};

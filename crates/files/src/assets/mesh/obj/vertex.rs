@@ -2,8 +2,7 @@
 
 use super::super::parsed::ColorRange;
 use super::super::text::expected;
-use super::statements::too_few;
-use super::words::{Words, number};
+use super::words::{Words, number, too_few};
 use crate::math::DVec3;
 
 /// Positions and colors.

@@ -94,6 +94,11 @@ pub(super) fn integer(word: &[u8]) -> Option<i64> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
+/// Reason to reject a statement with too few numbers.
+pub(super) fn too_few(wanted: usize, what: &str, found: usize) -> String {
+    format!("expected {wanted} {what}, found {found}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,8 +4,7 @@ use super::*;
 use crate::materials::bsdf::{LobeSet, RoughRow};
 use crate::materials::fresnel::dielectric;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, LitFrom, SideSample, Subject, check_neighbours, check_neighbours_lit, direction,
-    reference,
+    ALPHAS, COSINES, LitFrom, SideSample, Subject, check_neighbors, check_neighbors_lit, direction, reference,
 };
 use crate::math::DVec3;
 use crate::math::random::unit as random;
@@ -265,7 +264,7 @@ fn two_sided_samples_match_one_sided_ones() {
 fn lanes_are_independent() {
     let points: Vec<GlassPoint> =
         INDICES.into_iter().flat_map(|one| [0.001, 0.2, 1.0].map(|alpha| glass(one, alpha))).collect();
-    check_neighbours::<GlassRow<false>>(&points);
-    check_neighbours_lit::<GlassRow<true>>(&points, LitFrom::Through);
+    check_neighbors::<GlassRow<false>>(&points);
+    check_neighbors_lit::<GlassRow<true>>(&points, LitFrom::Through);
     const { assert!(GlassRow::<true>::SENDS_RAYS) };
 }

@@ -5,7 +5,7 @@ use super::*;
 use crate::choice::Choice;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, Subject, check_neighbours, check_values, direction, reference,
+    ALPHAS, COSINES, Subject, check_neighbors, check_values, direction, reference,
 };
 use crate::math::DVec3;
 
@@ -50,9 +50,9 @@ fn values_match_the_formulas_and_are_reciprocal() {
 fn lanes_are_independent() {
     let points =
         ALPHAS.into_iter().flat_map(|alpha| [schlick([alpha; 2]), of_element(Element::Iron, [alpha; 2])]);
-    check_neighbours::<IsotropicConductorRow>(&points.collect::<Vec<_>>());
+    check_neighbors::<IsotropicConductorRow>(&points.collect::<Vec<_>>());
     let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(Element::Iron, alphas));
-    check_neighbours::<BrushedConductorRow>(&points.collect::<Vec<_>>());
+    check_neighbors::<BrushedConductorRow>(&points.collect::<Vec<_>>());
 }
 
 #[test]

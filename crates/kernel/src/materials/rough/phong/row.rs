@@ -166,12 +166,12 @@ impl RoughRow for PhongRow {
 
     #[inline(always)]
     fn max_component(&self, values: &BsdfValues) -> F32x16 {
-        let mut grey = [0.0; PACKET_SIZE];
+        let mut gray = [0.0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             // The normal is not used here.
-            grey[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[0][i]);
+            gray[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[0][i]);
         }
-        grey
+        gray
     }
 
     #[inline(always)]

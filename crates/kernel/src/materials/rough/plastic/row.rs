@@ -212,14 +212,14 @@ impl RoughRow for PlasticRow {
                 coat[i] = self.coat(i, lane(directions, i));
             }
         }
-        let (mut f, mut grey) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
+        let (mut f, mut gray) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let (base, specular) = (lane(&self.base, i), lane(&self.specular, i));
             let value = base * (through[i] * self.shown[0][i]) + specular * (coat[i] * self.shown[1][i]);
             set_lane(&mut f, i, value + Vec3::splat(self.unit[i]));
-            grey[i] = base.max_element() * through[i] + specular.max_element() * coat[i];
+            gray[i] = base.max_element() * through[i] + specular.max_element() * coat[i];
         }
-        BsdfValues { f, shared: [grey, through] }
+        BsdfValues { f, shared: [gray, through] }
     }
 
     #[inline(always)]

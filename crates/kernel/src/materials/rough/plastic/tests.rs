@@ -3,7 +3,7 @@
 use super::*;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, Subject, check_neighbours, check_values, direction, reference,
+    ALPHAS, COSINES, Subject, check_neighbors, check_values, direction, reference,
 };
 use crate::math::DVec3;
 
@@ -42,7 +42,7 @@ fn lanes_are_independent() {
         .flat_map(|alpha| [plastic(RED, 1.0, 1.5, alpha), plastic(Vec3::ZERO, 0.8, 1.3, alpha)])
         .map(|one| point(&one))
         .collect();
-    check_neighbours::<PlasticRow>(&points);
+    check_neighbors::<PlasticRow>(&points);
 }
 
 #[test]

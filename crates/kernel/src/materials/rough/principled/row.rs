@@ -338,22 +338,22 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
 
     #[inline(always)]
     fn f(&self, directions: &Vec3x16) -> BsdfValues {
-        let (mut f, mut grey) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
+        let (mut f, mut gray) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let direction = lane(directions, i);
             let narrow = if THROUGH { self.transmitted(i, direction) } else { self.narrow(i, direction) };
             set_lane(&mut f, i, narrow * self.shown[1][i] + Vec3::splat(self.unit[i]));
-            grey[i] = narrow.max_element();
+            gray[i] = narrow.max_element();
         }
         if self.is_diffuse && !THROUGH {
             for i in 0..PACKET_SIZE {
                 let wide = self.wide(i, lane(directions, i));
                 let sum = lane(&f, i) + wide * self.shown[0][i];
                 set_lane(&mut f, i, sum);
-                grey[i] += wide.max_element();
+                gray[i] += wide.max_element();
             }
         }
-        BsdfValues { f, shared: [grey, [0.0; PACKET_SIZE]] }
+        BsdfValues { f, shared: [gray, [0.0; PACKET_SIZE]] }
     }
 
     #[inline(always)]

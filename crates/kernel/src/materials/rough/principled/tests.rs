@@ -3,7 +3,7 @@
 use super::*;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, LitFrom, Subject, check_neighbours, check_neighbours_lit, check_values, direction,
+    ALPHAS, COSINES, LitFrom, Subject, check_neighbors, check_neighbors_lit, check_values, direction,
     reference,
 };
 use crate::math::DVec3;
@@ -86,7 +86,7 @@ fn lanes_are_independent() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbours::<PrincipledRow<false>>(&points);
+    check_neighbors::<PrincipledRow<false>>(&points);
 }
 
 #[test]
@@ -232,6 +232,6 @@ fn transmissive_lanes_are_independent() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbours::<PrincipledRow<false>>(&points);
-    check_neighbours_lit::<PrincipledRow<true>>(&points, LitFrom::Through);
+    check_neighbors::<PrincipledRow<false>>(&points);
+    check_neighbors_lit::<PrincipledRow<true>>(&points, LitFrom::Through);
 }
