@@ -25,7 +25,7 @@ pub(super) fn not_kept(state: &State) -> Option<String> {
         state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
     let camera = if is_in_scene { CameraChange::default() } else { shown.camera };
     let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
-    let options = Toggles { camera, ..shown }.options(state.request.camera.filter(|_| has_orbiter));
+    let options = Toggles { camera, ..shown }.options(state.request.viewpoint().filter(|_| has_orbiter));
     (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
 }
 
@@ -373,6 +373,7 @@ mod tests {
         let mut ui = TestUi::new();
         ui.finish([200, 30, 30]);
         ui.state.request.text = Some(text.into());
+        ui.state.request.camera.as_mut().expect("a camera").aperture = 0.1;
         ui.press('l');
         let moved = ui.state.request.viewpoint().expect("a camera");
         let words = not_kept(&ui.state).expect("moved");

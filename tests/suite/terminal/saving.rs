@@ -205,7 +205,7 @@ fn recreated_folder_is_watched() {
         terminal.wait_for("missing");
         terminal.wait("which folder", |screen| {
             let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
-            text.contains("/work and")
+            text.contains("folder")
         });
         make(BLUE);
         terminal.wait_for_color("blue");
