@@ -124,7 +124,7 @@ fn misused_mtl_statements_are_corrected() {
     };
     let (plain, quiet) = said("Kd 0.8 0.8 0.8\n");
     assert!(!quiet.contains("warning"), "{quiet}");
-    let opaque = "a.mtl:3: `Tr 1` without `d`";
+    let opaque = "`Tr 1` without `d`";
     let dull = "a.mtl:3: `Ks` has no effect without `Ns`";
     for (mtl, words) in [
         ("Tr 1.000000\n", Some(opaque)),
