@@ -66,7 +66,7 @@ pub struct MethodResult {
     pub slope: Option<Slope>,
     /// Slope of error over time on log axes, from the last two steps.
     pub last_slope: Option<Slope>,
-    /// Times to reach [`TARGETS`].
+    /// Times to reach `TARGETS`.
     pub time_to: [Option<TimeTo>; TARGETS.len()],
     /// Whether the method is biased.
     pub verdict: Verdict,
