@@ -43,7 +43,7 @@ fn closest(tree: &WideBvh, mesh: &TriangleMesh, rays: &[Ray], answers: &[Option<
     );
 }
 
-/// Reports how many rays differ, and how many of them pass an edge within rounding.
+/// Reports how many rays differ, and how many of those pass within rounding error of an edge.
 fn report<'a>(mesh: &TriangleMesh, differing: impl Iterator<Item = &'a Ray>) {
     let differing: Vec<_> = differing.collect();
     let on_edge = differing.iter().filter(|ray| passes_edge(mesh, ray)).count();

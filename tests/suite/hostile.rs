@@ -16,7 +16,7 @@ const AT_ONCE: Duration = Duration::from_secs(10);
 const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-/// A scene that names `file` in one of the possible ways, and the line and column where it does.
+/// A scene that refers to `file`, with the line and column of the reference.
 fn scene(file: &str) -> (String, &'static str) {
     let ending = Path::new(file).extension().and_then(|ending| ending.to_str());
     let (text, place) = match ending {

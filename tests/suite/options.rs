@@ -431,7 +431,7 @@ fn dash_is_standard_output() {
         assert_mentions(&dir.expect(call, 2), &facts);
     }
     assert_eq!(names(&dir), ["ball.png", "ball.toml"]);
-    // By its path it is a file like any other.
+    // With a path, it is treated like any other file.
     dir.expect("ball.toml --once --report ./-", 0);
     assert!(dir.bytes("-").starts_with(b"{"));
 }

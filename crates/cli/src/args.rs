@@ -433,7 +433,7 @@ pub struct RenderArgs {
     /// Height in pixels
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("height"), help_heading = "Image")]
     pub height: Option<u32>,
-    /// Most samples per pixel
+    /// Maximum samples per pixel
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Image")]
     pub samples: Option<u32>,
     /// Noise at which a tile is finished; 0 disables it
@@ -469,7 +469,7 @@ pub struct RenderArgs {
     /// Integrator: whitted, path
     #[arg(long, value_parser = one_of::<Integrator>(), hide_possible_values = true, long_help = listed::<Integrator>("Integrator"), value_name = "NAME", help_heading = "Rendering")]
     pub integrator: Option<Integrator>,
-    /// Most bounces per path; 1 is direct light only
+    /// Maximum bounces per path; 1 is direct light only
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "Rendering")]
     pub max_depth: Option<u32>,
     /// Shadows: off, hard, soft

@@ -21,9 +21,9 @@ use crate::signals;
 use crate::system::priority;
 use crate::system::threads::start_failure;
 
-/// Most time to exit after a signal.
+/// Time limit for exiting after a signal.
 const EXIT_TIMEOUT: Duration = Duration::from_secs(2);
-/// Most time after a signal to finish writing an image. After that a checkpoint is written instead.
+/// Time limit for finishing an image after a signal. After that a checkpoint is written instead.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Interval for checking signals.
 const TICK: Duration = Duration::from_millis(50);

@@ -101,12 +101,12 @@ pub struct PreviewSize {
 pub enum Event {
     /// The worker started a request.
     Started {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
     },
     /// A stage began or ended.
     Stage {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The stage and its status.
         stage: StageReport,
@@ -114,7 +114,7 @@ pub enum Event {
     /// Files that were read or tried, which the request depends on. Each such event contains all files known so far,
     /// and the front end watches the files of the latest event.
     Files {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The scene and all files it references.
         files: Vec<FileRead>,
@@ -125,21 +125,21 @@ pub enum Event {
     },
     /// All warnings are known, before the image is rendered.
     Warnings {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The same warnings as in [`Event::Done`].
         warnings: Vec<Diagnostic>,
     },
     /// An asset is loading.
     Asset {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// Progress of the asset.
         progress: AssetProgress,
     },
     /// The scene is valid and has these effective settings.
     Settings {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The settings.
         settings: Box<Effective>,
@@ -152,26 +152,26 @@ pub enum Event {
     },
     /// The scene file was read.
     Text {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// Text of the scene file, or of the scene generated for a model.
         text: Arc<str>,
     },
     /// The render made progress.
     Progress {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// Progress of the render.
         progress: RenderProgress,
     },
     /// The slot contains a newer preview.
     Preview {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
     },
     /// An image was written.
     Written {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The file.
         path: PathBuf,
@@ -182,14 +182,14 @@ pub enum Event {
     },
     /// State of the scene's own image, for a request that shows another one.
     OwnImage {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The state.
         state: OwnState,
     },
     /// An image or a report could not be written. Rendering continues.
     WriteFailed {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The file, if only one failed. Its content is unknown.
         path: Option<PathBuf>,
@@ -198,7 +198,7 @@ pub enum Event {
     },
     /// A file was replaced, and some metadata of the old file could not be preserved.
     NotKept {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The file and the lost metadata.
         message: String,
@@ -206,54 +206,54 @@ pub enum Event {
     /// No file is written, because at least one must not be: it is an input, is named twice, or contains something that
     /// glimt did not write. Rendering continues.
     Refused {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// One diagnostic per such file, with a solution.
         conflicts: Vec<Diagnostic>,
     },
     /// News about the checkpoint of the render.
     Checkpoint {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The news.
         news: CheckpointNews,
     },
     /// [`Command::Write`] is postponed until every pixel has a sample.
     WritePostponed {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
     },
     /// [`Command::Write`] has written all files.
     WriteDone {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The files.
         paths: Vec<PathBuf>,
     },
     /// Answer to [`Command::KeepCamera`].
     CameraKept {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The file with the camera, or why glimt did not write it.
         outcome: Result<KeptCamera, String>,
     },
     /// Answer to [`Command::UndoCamera`].
     CameraUndone {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The restored file, or why glimt did not write it.
         outcome: Result<PathBuf, String>,
     },
     /// Answer to [`Command::Pick`].
     Picked {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// The object and the color.
         picked: Box<Picked>,
     },
     /// The request is finished.
     Done {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// Report of the request.
         report: Box<Report>,
@@ -264,7 +264,7 @@ pub enum Event {
     },
     /// The request failed. The previous image remains.
     Failed {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// Why.
         failure: Failure,
@@ -272,14 +272,14 @@ pub enum Event {
     /// The render of the last good scene ended. It replaced the request's own scene, which could not be read, as
     /// [`Event::Failed`] reported.
     LastGoodEnded {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
         /// How the render ended.
         end: LastGoodEnd,
     },
     /// The request was cancelled by a newer one or by [`Command::Cancel`].
     Cancelled {
-        /// Number of the request.
+        /// Request number.
         generation: u64,
     },
 }
@@ -420,7 +420,7 @@ pub type PreviewSlot = Arc<std::sync::Mutex<Option<LatestPreview>>>;
 /// A preview and the image it shows.
 #[derive(Clone, Debug)]
 pub struct LatestPreview {
-    /// Number of the request.
+    /// Request number.
     pub generation: u64,
     /// The preview, within the requested size.
     pub picture: Arc<Picture>,

@@ -97,7 +97,7 @@ impl Drop for Handle {
     fn drop(&mut self) {
         self.send(Command::Quit);
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been reported as an event.
+            // If the thread panicked, an event has reported it.
             let _ = thread.join();
         }
     }

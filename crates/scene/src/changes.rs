@@ -7,7 +7,7 @@ use super::sanitize::shortened;
 /// Longest text that is compared, in bytes. Longer texts are not edited by hand.
 pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 
-/// Most characters shown of a line.
+/// Maximum number of characters shown per line.
 const MAX_LINE_CHARS: usize = 40;
 
 /// Lists the changes between two texts, such as `sphere.ball.radius 0.5 → 0.7`, with keys in the form that `--set` takes. If

@@ -54,7 +54,7 @@ pub fn is_absence(diagnostic: &Diagnostic) -> bool {
     [SCENE_NOT_FOUND, MODEL_NOT_FOUND].contains(&diagnostic.message.as_str())
 }
 
-/// Most syntax elements (brackets, `=`, `,` and lines) in a scene file: each takes many times its size in memory. A scene
+/// Maximum number of syntax elements (brackets, `=`, `,` and lines) in a scene file: each takes many times its size in memory. A scene
 /// of a million spheres has half as many.
 const MAX_PARTS: usize = 32 << 20;
 

@@ -190,7 +190,7 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
     (format!("cannot read the scene file: {}", describe_error(error)), None)
 }
 
-/// Most files of a folder that are examined.
+/// Maximum number of files examined per folder.
 pub(super) const MAX_FOLDER_FILES: usize = 2_000;
 
 /// The file with the most similar name in the folder of a missing file, among those that `may_be_meant` accepts.

@@ -88,7 +88,7 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
     text
 }
 
-/// Least width of a report, for narrower terminals.
+/// Minimum width of a report, even in narrower terminals.
 const MIN_WIDTH: usize = 30;
 
 fn render_one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut Locator) -> String {

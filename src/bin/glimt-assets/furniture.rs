@@ -35,7 +35,7 @@ pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     ]
 }
 
-/// A cushion of 1 by 0.2 by 1, thinner toward its edges.
+/// A 1 × 0.2 × 1 cushion, thinner toward its edges.
 fn cushion() -> Surface {
     let (rings, sides) = (9, 32);
     let outline = |ring: u32| {

@@ -476,7 +476,7 @@ fn curved_opaque_surface_closes_a_sheet() {
     };
     let fits = bodies(&with(label.clone()));
     assert!(!fits.has_open() && fits.open().iter().all(|open| open.is_covered), "{:?}", fits.open());
-    // The label has come off.
+    // The label does not touch the bottle.
     let off =
         TriangleMesh { positions: label.positions.iter().map(|p| p + Vec3::X * 0.02).collect(), ..label };
     assert!(bodies(&with(off)).has_open());

@@ -17,7 +17,7 @@ pub fn by_paths(build: Build, max_depth: u32) -> Build {
 }
 
 /// Checks |mean − exact| ≤ 4 standard errors over seeds. The standard error is at most this fraction of the exact
-/// value, so that noise alone does not pass.
+/// value, so that a noisy estimate cannot pass.
 #[track_caller]
 pub fn assert_near(what: &str, values: &[f64], exact: f64, most_error: f64) {
     assert!(values.len() >= 16, "too few seeds");

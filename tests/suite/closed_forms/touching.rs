@@ -271,7 +271,7 @@ fn touching_meshes_act_as_layers() {
             let what = format!("mesh on a box, round {round}, {later}");
             assert_within(&what, &seen, 512, layers(&[1.5, 2.0], 0.0).1, 2e-3);
         }
-        // Two parts of one mesh with different glass share a face with different triangles.
+        // Two parts of one mesh, of different glass, share a face that they triangulate differently.
         let parts = boxes(&[(v(0.0, -0.5, 0.0), 1.0, 0), (v(0.2, -1.75, 0.1), 1.5, 1)]);
         let turn = |mut mesh: glimt::geometry::mesh::TriangleMesh| {
             for p in &mut mesh.positions {

@@ -156,8 +156,8 @@ fn say(text: &str) {
 /// The last panic, wherever it was caught.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// Installs a hook that records all panics. The library silences the panics it contains once it has been used, so use
-/// it first.
+/// Installs a hook that records all panics. The library installs a hook of its own when
+/// it is first used, so use it before calling this.
 fn listen_to_panics(dir: &CaseDir) {
     let _ = check(
         &dir.place_case(

@@ -168,7 +168,7 @@ fn ctrl_z_suspends_and_fg_resumes() {
         !screen.alternate_screen() && !screen.hide_cursor() && is_asked
     };
     terminal.wait("the shell", is_shell);
-    // If the shell echoes the result, the terminal's modes are its own; the sum does not appear in the typed text.
+    // The shell prints the result only if the terminal's modes were restored. The typed text does not contain the sum.
     terminal.press("echo $((40 + 2))th\n");
     terminal.wait_for("42th");
     terminal.press("fg\n");

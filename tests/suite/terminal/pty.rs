@@ -146,7 +146,7 @@ impl Folder {
     }
 }
 
-/// A terminal with a program inside.
+/// A terminal with a program running in it.
 pub struct Terminal {
     master: Box<dyn MasterPty + Send>,
     // Kept open so that the terminal's modes can be read after the program has ended.

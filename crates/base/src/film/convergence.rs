@@ -124,8 +124,8 @@ impl Steps {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
-    /// Samples that a pixel of `count` samples needs to reach the next recorded count: a power of two or
-    /// halfway to the next one.
+    /// Number of additional samples after which a pixel with `count` samples is recorded again: at powers of
+    /// two, and halfway between them.
     pub(super) fn samples_to_next(count: u32) -> usize {
         let count = u64::from(count);
         let power = (count + 1).next_power_of_two();

@@ -9,7 +9,7 @@ pub struct PiecewiseConstant2D {
     rows: Vec<f32>,
     /// Cumulative probabilities of the columns in each row, `columns + 1` values per row.
     in_row: Vec<f32>,
-    /// Guide tables for the search of a row, and of a column in each row; see [`guide`].
+    /// Guide tables for finding a row, and a column within each row; see [`guide`].
     row_guide: Vec<u32>,
     column_guide: Vec<u32>,
 }

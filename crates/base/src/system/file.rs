@@ -51,7 +51,7 @@ pub fn kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     Ok((FileKind::of(path, &metadata), metadata))
 }
 
-/// Most bytes of a pointer of Git LFS (the specification of Git LFS: "pointer files must be less than 1024 bytes").
+/// Maximum size of a Git LFS pointer in bytes (the specification of Git LFS: "pointer files must be less than 1024 bytes").
 pub const LFS_POINTER_LIMIT: u64 = 1024;
 
 /// Whether these bytes are a pointer of Git LFS in place of a file's content.

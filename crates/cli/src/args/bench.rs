@@ -72,7 +72,7 @@ pub struct BenchArgs {
     pub reference: Vec<PathBuf>,
     /// Samples per pixel of each reference
     ///
-    /// The default uses the available time, but at most 100 times the largest --samples.
+    /// By default, as many as fit in the available time, up to 100 times the largest --samples.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("samples"), help_heading = "Measurement")]
     pub reference_samples: Option<u32>,
     /// Folder for cached references
@@ -101,7 +101,7 @@ pub struct BenchArgs {
     /// Override a scene key
     #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE", help_heading = "All images and references")]
     pub sets: Vec<String>,
-    /// Most bounces per path
+    /// Maximum bounces per path
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All images and references")]
     pub max_depth: Option<u32>,
     /// Depth of field, if the camera has an aperture

@@ -66,7 +66,7 @@ pub(crate) fn keys() -> ArgValueCompleter {
 
 /// Candidates for the prefix `typed`, in a scene with this text.
 fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
-    /// Most candidates.
+    /// Maximum number of candidates.
     const MAX_CANDIDATES: usize = 2000;
     let outline = outline(text);
     let singles = tables().iter().filter(|table| table.form == Form::Single);

@@ -6,7 +6,7 @@ use super::{Progress, candidates, listed, one_of};
 use crate::choice;
 use crate::tui::ColorChoice;
 
-/// Most parts of an image.
+/// Maximum number of parts of an image.
 pub(super) const MAX_PARTS: u32 = 1 << 20;
 
 pub(super) const MERGE_HELP: &str = "\

@@ -12,7 +12,7 @@ use crate::film::RadianceImage;
 
 /// Significance level of the test for bias.
 pub const FALSE_POSITIVE_RATE: f64 = 0.001;
-/// Fewest seeds needed to estimate a bias.
+/// Minimum number of seeds needed to estimate a bias.
 pub const MIN_SEEDS: usize = 3;
 
 /// An estimated bias.

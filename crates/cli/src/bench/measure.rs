@@ -37,7 +37,7 @@ pub(super) struct MethodRun<'a> {
     /// ReferenceKeys of the references.
     pub(super) keys: &'a ReferenceKeys,
     pub(super) two: &'a TwoReferences,
-    /// Most samples of a step by default.
+    /// Default maximum number of samples of a step.
     pub(super) most_samples: f64,
 }
 

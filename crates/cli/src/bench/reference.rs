@@ -22,13 +22,13 @@ const UNLIMITED_SAMPLES: u32 = 1 << 24;
 
 /// Ratio of the references' samples to the most measured samples.
 const REFERENCE_RATIO: u32 = 100;
-/// Least upper limit of the measured samples, even for references with few samples.
+/// Lower bound on that limit, even for references with few samples.
 const MIN_MEASURED: f64 = 16.0;
 
-/// Most samples measured by default.
+/// Default maximum number of samples to measure with.
 const MAX_MEASURED: f64 = 65_536.0;
 
-/// Most samples to measure with references of this quality. `None` for files, whose samples are unknown.
+/// Largest sample count that these references are good enough for. `None` for files, whose sample count is unknown.
 pub(super) fn most_measured(of_references: Option<f64>) -> f64 {
     let most = of_references.map_or(MAX_MEASURED, |samples| samples / f64::from(REFERENCE_RATIO));
     most.clamp(MIN_MEASURED, MAX_MEASURED)

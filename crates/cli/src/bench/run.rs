@@ -87,7 +87,7 @@ pub fn size(scene: &Scene, asked: (Option<u32>, Option<u32>)) -> (u32, u32) {
 
 /// Checks that the seeds of images and references do not overlap.
 fn check_seeds(order: &BenchRequest) -> Result<(), BenchError> {
-    /// Most steps of a default schedule.
+    /// Maximum number of steps in a default schedule.
     const MAX_STEPS: u32 = 64;
     let steps = match &order.steps {
         StepSchedule::Climb => MAX_STEPS,

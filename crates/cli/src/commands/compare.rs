@@ -235,7 +235,7 @@ fn table(summary: &Summary<'_>, columns: Option<usize>) -> Vec<String> {
 
 /// Values with their description to the right, or below if there is no room.
 fn row(figures: &str, note: &str, columns: Option<usize>) -> Vec<String> {
-    /// Least width of a description.
+    /// Minimum width of a description.
     const MIN_NOTE_COLUMNS: usize = 24;
     const INDENT: usize = 4;
     let start = figures.chars().count();

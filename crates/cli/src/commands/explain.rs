@@ -40,7 +40,7 @@ fn wrap_indented(text: &str, columns: usize) -> String {
     fitted
 }
 
-/// Least width for wrapping.
+/// Minimum width for wrapping.
 const MIN_COLUMNS: usize = 16;
 
 /// Whether a table has a type of this name.

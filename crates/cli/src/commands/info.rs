@@ -75,7 +75,7 @@ fn as_json(path: &Path, info: &ImageInfo) -> Value {
     })
 }
 
-/// Most columns of the name column. Longer names move their values to the right.
+/// Maximum width of the name column. Longer names move their values to the right.
 const MAX_NAME_COLUMNS: usize = 40;
 
 /// A line about the file, followed by one for each setting.

@@ -9,7 +9,7 @@ use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, Sta
 use crate::pipeline::words::Eta;
 use crate::scene::sanitize::visible;
 
-/// Least width of the bar.
+/// Minimum width of the bar.
 const MIN_BAR_COLUMNS: usize = 10;
 /// Assumed width of a terminal of unknown size.
 const DEFAULT_COLUMNS: usize = 80;

@@ -82,7 +82,7 @@ impl Plane {
         []
     }
 
-    /// The plane's reference point, as no uniform sampling exists.
+    /// Returns the plane's reference point: an infinite area cannot be sampled uniformly.
     pub fn sample(&self, _: u32, _: Vec2) -> AreaPoint {
         AreaPoint { point: self.point, normal: self.normal }
     }

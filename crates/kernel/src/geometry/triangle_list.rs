@@ -44,7 +44,7 @@ const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 /// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
 const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 
-/// Maximum error of coordinates at which a facet can be missed with certainty.
+/// Largest coordinate error for which a miss can still be decided with certainty.
 const BLUNT: f32 = 0.125;
 
 /// Maximum of D/(2A), relative to the size of all triangles.

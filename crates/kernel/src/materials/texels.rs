@@ -63,7 +63,7 @@ impl Texels {
         }
     }
 
-    /// Linear color, not premultiplied, at an index of data with alpha.
+    /// Linear color without premultiplied alpha, at a texel index.
     #[cold]
     fn without_weight(&self, place: usize) -> Vec3 {
         match &self.data {

@@ -137,7 +137,7 @@ pub(super) struct Engine {
     checkpoint_lock: RefCell<CheckpointLock>,
 }
 
-/// Maximum number of times that a request starts again because the scene's files change.
+/// How often a request may restart because files of the scene have changed.
 const MAX_READS: usize = 16;
 
 /// A scene that is ready to be rendered.

@@ -120,7 +120,7 @@ impl Engine {
         state.map_or(0, FilmState::memory_bytes)
     }
 
-    /// Records the share of the scene's own image, if the request renders it.
+    /// Records which share of the scene's own image this process renders, if the request renders that image.
     pub(super) fn share_own(&mut self, request: &Request, ready: &Ready) {
         if let Some(own) = self.own.as_mut().filter(|_| request.own.is_none()) {
             own.share.clone_from(&ready.share);
@@ -137,7 +137,7 @@ impl Engine {
         });
     }
 
-    /// Whether the files of the scene's own image contain it.
+    /// Whether the output files are up to date with the scene's own image.
     pub(super) fn is_own_written(&self) -> bool {
         self.own.as_ref().is_some_and(|own| self.written.own == Some(own.image))
     }

@@ -13,7 +13,7 @@ pub(crate) const LEAST: u32 = PREPASS_SAMPLES;
 /// Fraction of the noise target that is aimed at, because parts measured too low stop early.
 pub(crate) const AIM: f64 = 0.85;
 
-/// Ratio to the noise target above which a tile is reported, beyond the uncertainty of the measurement.
+/// Tiles are reported if their noise exceeds the target by more than this factor, which allows for measurement error.
 const TOO_MUCH: f64 = 1.5;
 
 /// Maximum number of expected samples. [`u32::MAX`] means unknown.

@@ -71,7 +71,7 @@ fn open_glass_warnings(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
     groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
 }
 
-/// Returns the flaw of an open object.
+/// Returns the problem with an object that is not closed.
 fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<GlassFlaw> {
     let shape = &loaded.scene.objects[open.object as usize].shape;
     if shape.mesh().is_some() {

@@ -8,11 +8,11 @@ use crate::toml::{self, Elements, Entries, TomlValue, Value};
 
 /// Longest text that is parsed, in bytes: parsing delays the new render by a few milliseconds.
 const MOST_BYTES: usize = 256 << 10;
-/// Most changes listed individually; the rest are counted.
+/// Maximum number of changes listed individually; the rest are counted.
 const MAX_LISTED: usize = 3;
-/// Most characters shown of a value.
+/// Maximum number of characters shown per value.
 const MAX_VALUE_CHARS: usize = 48;
-/// Most columns of a key.
+/// Maximum width of a key in columns.
 const MAX_KEY_COLUMNS: usize = 48;
 
 /// Lists the keys whose values differ, with both values. Empty if no key differs or a text is not TOML.

@@ -79,6 +79,6 @@ pub struct Photons {
     pub count: u64,
     /// Kernel radius of the first pass. 0 chooses it from the photon density.
     pub radius: f64,
-    /// Most bounces of a photon.
+    /// Maximum number of bounces of a photon.
     pub bounces: u32,
 }

@@ -26,13 +26,13 @@ macro_rules! __render_keys {
             width: u32 = 640, whole(1, 65_536), "pixels", option;
             /// Height of the image.
             height: u32 = 480, whole(1, 65_536), "pixels", option;
-            /// Most samples per pixel.
+            /// Maximum number of samples per pixel.
             samples: u32 = 64, whole(1, u32::MAX), "per pixel", option;
             /// Noise at which a tile is finished; 0 always takes all `samples`.
             error: f32 = 0.0, at_least(0.0), "fraction of the brightness", option;
             /// Shadow rays per sample to each area light.
             shadow_samples: u32 = 1, whole(1, 4096), "per light", scene;
-            /// Most bounces along a path: 0 shows only emitted light, 1 adds direct light.
+            /// Maximum number of bounces along a path: 0 shows only emitted light, 1 adds direct light.
             max_depth: u32 = 8, whole(0, MAX_BOUNCES), "bounces", option;
             /// The rendering algorithm.
             integrator: Integrator = Integrator::Whitted, choice, "", option;

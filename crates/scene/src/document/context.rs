@@ -212,16 +212,16 @@ impl<'a> Context<'a> {
 /// End of the message that counts the issues that are not listed.
 pub(crate) const MORE_LIKE_THESE: &str = "more like these";
 
-/// Most issues listed.
+/// Maximum number of issues listed.
 const MAX_ISSUES: usize = 500;
 
-/// Most searches for similar names per file.
+/// Maximum number of searches for similar names per file.
 const MAX_SEARCHES: usize = 48;
 
-/// Most name comparisons per file, checked before each search.
+/// Maximum number of name comparisons per file, checked before each search.
 const MAX_COMPARISONS: usize = 200_000;
 
-/// Most errors, and most warnings, that are collected: enough that the first ones in file order are found, except in absurdly
+/// Maximum number of errors, and of warnings, that are collected: enough that the first ones in file order are found, except in absurdly
 /// broken files.
 const MAX_COLLECTED: usize = 10_000;
 

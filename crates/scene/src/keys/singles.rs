@@ -69,7 +69,7 @@ pub(super) const PHOTONS: TableInfo = single(
             Is("0.0"),
             "Kernel radius of the first pass; 0 chooses it from the photon density",
         ),
-        key("bounces", Whole(0, 4_294_967_295), "bounces", Is("16"), "Most bounces of a photon"),
+        key("bounces", Whole(0, 4_294_967_295), "bounces", Is("16"), "Maximum number of bounces of a photon"),
     ],
 );
 

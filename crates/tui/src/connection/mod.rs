@@ -84,8 +84,8 @@ pub(super) struct Connection {
     /// Time at which the window last shrank. Slices sent earlier carry no new information.
     shrunk: Option<Instant>,
     round_trips: RoundTrips,
-    /// Round trips of the last slices, including small ones: a connection that was slow for a moment gets
-    /// only small slices, which must be able to show that it is fast again.
+    /// Round-trip times of the last slices. Small slices are included, because after a slow moment a
+    /// connection gets only small ones, and they must reveal when it is fast again.
     recent: VecDeque<Duration>,
     /// Time of the last reply, or of the oldest query that awaits one.
     heard: Instant,

@@ -13,7 +13,7 @@ struct SimulatedTerminal {
     /// Replies in flight.
     due: VecDeque<(Instant, QueryKind)>,
     carried: usize,
-    /// Most bytes in flight so far.
+    /// Maximum number of bytes in flight so far.
     most_in_flight: usize,
     /// Longest queueing delay in the last run.
     longest: Duration,

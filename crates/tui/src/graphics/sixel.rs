@@ -12,7 +12,7 @@ const FIRST: u8 = 16;
 /// Number of registers.
 const REGISTERS: usize = 256;
 
-/// The commands that show an image at the cursor over these cells of `cell` pixels. The palette is made from
+/// Encodes an image to be drawn at the cursor, covering these cells of `cell` pixels each. The palette is made from
 /// the image, or kept if it still fits. An image with fewer pixels is enlarged after its colors have been
 /// chosen, so time and memory depend on its own size.
 pub(super) fn encode(

@@ -7,7 +7,7 @@ pub enum Fidelity {
     First,
     /// A later preview that will still be refined.
     Moving,
-    /// Like `Moving`, on a terminal that can follow the render: exact colors.
+    /// Like `Moving`, but with exact colors, for terminals fast enough to follow the render.
     Following,
     /// A final preview: colors exact to 1/255.
     Still,

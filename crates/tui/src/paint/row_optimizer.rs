@@ -276,7 +276,7 @@ struct PathEnd<'a> {
     bytes: u32,
     /// Error of the previous cells.
     error: f32,
-    /// Cost of a byte.
+    /// Cost per byte.
     byte: f32,
     tile: Tile,
     beam: &'a mut Beam,

@@ -186,7 +186,7 @@ enum PainterStep {
     Aim(Buffer, Fidelity),
     Slice(usize),
     Forget,
-    /// Another program writes to the screen and the painter forgets its content.
+    /// Another program writes to the screen, and the painter discards what it knew about it.
     Litter,
 }
 

@@ -396,7 +396,7 @@ fn held_key_fills_a_slow_connection() {
     assert!(watch.terminal.most_unanswered <= 24_000, "{} bytes", watch.terminal.most_unanswered);
 }
 
-/// kitty 0.26 shows no images whose chunks are sent as synchronized output.
+/// kitty 0.26 does not show images that are sent within synchronized output.
 #[test]
 fn only_cells_are_synchronized_output() {
     let (begin, end) = ("\x1b[?2026h", "\x1b[?2026l");

@@ -295,7 +295,7 @@ fn message_is_shown_until_the_next_key() {
     ui.press('?');
     ui.press('?');
     assert!(!ui.text().contains(messages::NOTHING_TO_RESET));
-    // Without its own line, it replaces the keys, or the name in the header.
+    // If a message has no line of its own, it replaces the keys or the name in the header.
     for rows in [12, 5] {
         ui.event(Event::Resize(window(60, rows)));
         ui.press('0');

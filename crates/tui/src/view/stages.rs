@@ -11,7 +11,7 @@ pub(super) type StyledLine = Vec<(String, Tone)>;
 
 /// Stages that took less than this fraction of the total time are left out of the single line.
 const SMALL: f64 = 0.02;
-/// Columns of a name and a time, including the gap.
+/// Width of the name and time columns, including the gap.
 const TIME_ENDS: u16 = 16;
 /// Minimum columns of a reason.
 const MIN_WHY: u16 = 12;

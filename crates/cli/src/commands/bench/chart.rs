@@ -21,9 +21,9 @@ const COLORS: [Color; 6] =
 const MARKERS: [char; 5] = ['o', 'x', '+', '*', '#'];
 /// Rows of a chart.
 const ROWS: u16 = 16;
-/// Most columns of a chart.
+/// Maximum width of a chart.
 const MAX_COLUMNS: u16 = 100;
-/// Least size of a readable chart.
+/// Minimum size of a readable chart.
 const MIN_SIZE: (u16, u16) = (30, 8);
 /// Rows that a chart leaves free for the current task, the bar and the prompt.
 const RESERVED_ROWS: u16 = 6;

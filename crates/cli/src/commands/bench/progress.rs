@@ -17,7 +17,7 @@ use crate::scene::sanitize::visible;
 const INTERVAL: Duration = Duration::from_secs(10);
 /// Resolution of the bar.
 const STEPS: u64 = 1000;
-/// Most frames per second of the plot and the bar.
+/// Maximum frame rate of the plot and the bar.
 const FRAMES: u8 = 8;
 
 /// Reports progress in the requested format.

@@ -1,4 +1,4 @@
-//! Hover texts and definitions for the key or name under the cursor.
+//! Hover text and definition of the key or name under the cursor.
 
 use std::ops::Range;
 

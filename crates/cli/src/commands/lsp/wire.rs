@@ -9,9 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lsp_server::{ErrorCode, Message};
 use serde_json::{Value, json};
 
-/// Most bytes of a message: enough for the largest scene with every byte escaped.
+/// Maximum size of a message: enough for the largest scene with every byte escaped.
 const MAX_MESSAGE_BYTES: u64 = 6 << 27;
-/// Most bytes of a header.
+/// Maximum size of a header.
 const MAX_HEADER_BYTES: u64 = 1 << 14;
 
 /// A frame from the client.

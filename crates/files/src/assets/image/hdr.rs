@@ -219,7 +219,7 @@ fn positive<const N: usize>(numbers: &[f64; N]) -> bool {
     numbers.iter().all(|number| number.is_finite() && *number > 0.0)
 }
 
-/// An axis of the pixel order.
+/// An axis along which pixels are stored.
 #[derive(Clone, Copy)]
 struct ScanAxis {
     is_vertical: bool,

@@ -51,7 +51,7 @@ pub enum ImageEncoding {
     Srgb,
     /// Always linear, as in normal maps.
     Linear,
-    /// Like [`Self::Color`], but negative and nonfinite floats are kept. For images that are compared.
+    /// Like [`Self::Color`], but keeps negative and nonfinite floats. Used for comparing images.
     Raw,
     /// One scalar per pixel, in all channels. Alpha is always linear.
     Number {

@@ -17,7 +17,7 @@ pub struct Head {
     pub kind: PartKind,
     /// Everything that the image depends on, with user-visible names.
     pub identity: Vec<Dependency>,
-    /// The contained part of the image.
+    /// The part of the image that the file contains.
     pub share: ShareHead,
     /// Properties of the image.
     pub picture: ImageHead,
@@ -256,7 +256,7 @@ fn name_of(name: &str) -> &str {
     name.strip_prefix(FILE).unwrap_or(name)
 }
 
-/// Prefix of the names of files, whose values are hashes.
+/// Prefix of the keys under which file hashes are stored.
 const FILE: &str = "file ";
 
 impl Dependency {

@@ -232,7 +232,7 @@ pub struct ConeView {
 }
 
 impl RevolutionEmitter<ConeSide> {
-    /// The emitter of an entire cone.
+    /// A light in the shape of a whole cone.
     pub fn of_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
         let (height, radius) = ((base.centroid() - tip).length(), base.radius());

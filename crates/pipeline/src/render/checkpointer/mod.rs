@@ -1,4 +1,4 @@
-//! Saving and restoring of checkpoints of a render.
+//! Saves and restores render checkpoints.
 
 mod lock;
 mod state;

@@ -25,7 +25,7 @@ pub struct VertexBatch {
     pub horizon: Vec3x16,
     pub has_horizon: u32,
     /// Origins above the facets, from which lights in all directions are visible, and the `t_max` of the rays to them.
-    /// They apply in the lanes whose bits are set, if those rays are unoccluded.
+    /// Only valid in the lanes whose bits are set, and only if those rays are unoccluded.
     pub lifted: Vec3x16,
     pub lift_end: F32x16,
     pub may_lift: u32,

@@ -14,7 +14,7 @@ pub struct RayCone {
 /// Fraction of a lobe's radius that one path's cone covers, as if a hundred paths shared the lobe.
 const SHARE: f32 = 0.1;
 
-/// A specular bounce, which changes the spread of a beam according to its width.
+/// A specular bounce, which changes the spread of a beam depending on the width of the beam.
 #[derive(Clone, Copy, Debug)]
 pub enum SpecularEvent {
     /// Reflection.

@@ -221,7 +221,7 @@ impl SampleBsdf<'_> {
             set_lane(&mut factors, i, Vec3::splat(factor));
             alive |= if (pdfs[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
         }
-        // Drop directions behind the facets. Rays whose origins are known on both sides do not start on a triangle.
+        // Drop directions behind the facets. Rays with an offset origin on both sides do not start on a triangle.
         let mut hidden = [0; PACKET_SIZE];
         for i in 0..PACKET_SIZE {
             let cosine = lane(&row.horizon, i).dot(lane(wi, i)) * sides[i];

@@ -357,7 +357,7 @@ impl Hole {
         Self { rims: own.into_iter().map(|(rim, _)| rim).collect(), disagree, part: missing / area }
     }
 
-    /// Reports on one part. `None` if it has no edge at the hole, or if the hole is only rounding.
+    /// Reports on one part. `None` if it does not border the hole, or if the hole is just rounding error.
     fn at(&self, part: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.part == part);
         let edges = own().count();

@@ -127,7 +127,7 @@ impl SimdRay {
         let (origin, direction) = origin_and_direction(ray);
         let (min, max) = corners(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
-        // Margin of the boxes around their triangles: `triangle_margin`, plus the additional error of fused
+        // How far boxes extend beyond their triangles: `triangle_margin`, plus the additional error of fused
         // products.
         let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
         let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);

@@ -201,7 +201,7 @@ impl Principled {
         let has_coat = inputs.clearcoat.constant() != Some(0.0);
         let coat = inputs.clearcoat_roughness.constant().filter(|_| has_coat);
         let albedos = [inputs.roughness.constant(), coat].map(|roughness| roughness.map(SchlickAlbedo::of));
-        // The albedo of a coat without weight is irrelevant.
+        // The albedo does not matter if the coat has no weight.
         let [specular, coat] = albedos;
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
