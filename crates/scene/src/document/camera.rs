@@ -7,7 +7,7 @@ use super::table::TableReader;
 use crate::math::DVec3;
 
 /// Default field of view.
-pub(in super::super) const FOV_DEGREES: f64 = 40.0;
+pub(crate) const FOV_DEGREES: f64 = 40.0;
 
 /// `up` and the view direction count as parallel if the sine of the angle between them is less than this.
 const MIN_SINE: f64 = 1e-6;

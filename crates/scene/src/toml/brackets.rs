@@ -5,15 +5,15 @@ use toml_parser::lexer::TokenKind;
 
 /// A bracket of an array. Brackets in headers, strings and comments are skipped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) struct Bracket {
+pub(crate) struct Bracket {
     /// Byte offset in the text.
-    pub(in super::super) at: usize,
+    pub(crate) at: usize,
     /// Whether it is `[`.
-    pub(in super::super) opens: bool,
+    pub(crate) opens: bool,
 }
 
 /// Returns the array brackets in a text that starts with an expression.
-pub(in super::super) fn brackets(text: &str) -> Vec<Bracket> {
+pub(crate) fn brackets(text: &str) -> Vec<Bracket> {
     let mut brackets = Vec::new();
     let (mut depth, mut is_line_start, mut is_header) = (0_usize, true, false);
     for token in Source::new(text).lex() {
@@ -47,7 +47,7 @@ pub(in super::super) fn brackets(text: &str) -> Vec<Bracket> {
 }
 
 /// The offset of the innermost bracket that is still open at the end.
-pub(in super::super) fn last_open(brackets: &[Bracket]) -> Option<usize> {
+pub(crate) fn last_open(brackets: &[Bracket]) -> Option<usize> {
     let mut closed = 0_usize;
     for bracket in brackets.iter().rev() {
         match (bracket.opens, closed) {

@@ -6,13 +6,13 @@ use toml_parser::{Expected, ParseError};
 
 /// A TOML syntax error, or a duplicate or conflicting key.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct SyntaxError {
+pub(crate) struct SyntaxError {
     /// Byte range in the text.
-    pub(in super::super) span: Range<usize>,
+    pub(crate) span: Range<usize>,
     /// Short description.
-    pub(in super::super) what: String,
+    pub(crate) what: String,
     /// Expected tokens: a list, or `nothing`.
-    pub(in super::super) expected: Option<String>,
+    pub(crate) expected: Option<String>,
 }
 
 impl SyntaxError {

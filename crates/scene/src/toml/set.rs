@@ -6,20 +6,20 @@ use super::tree::{Document, Name, NodeKind, TableId, TableOrigin, ValueNode};
 
 /// A key that cannot be set.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) struct KeyError {
+pub(crate) struct KeyError {
     /// Byte range of the part that cannot be resolved.
-    pub(in super::super) span: Range<usize>,
+    pub(crate) span: Range<usize>,
     /// The parts before it.
-    pub(in super::super) above: Vec<String>,
+    pub(crate) above: Vec<String>,
     /// The part itself.
-    pub(in super::super) part: String,
+    pub(crate) part: String,
     /// The reason.
-    pub(in super::super) why: KeyErrorKind,
+    pub(crate) why: KeyErrorKind,
 }
 
 /// Reasons why a part of a key cannot be resolved.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(in super::super) enum KeyErrorKind {
+pub(crate) enum KeyErrorKind {
     /// There is no table of this name, and it must not be created.
     Unknown {
         /// Keys that exist.
@@ -43,11 +43,11 @@ pub(in super::super) enum KeyErrorKind {
 
 /// The groups and lists at the top level.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Layout {
+pub(crate) struct Layout {
     /// Top-level tables of named tables, which are not created.
-    pub(in super::super) groups: &'static [&'static str],
+    pub(crate) groups: &'static [&'static str],
     /// Whether a top-level name is a list of tables.
-    pub(in super::super) is_list: fn(&str) -> bool,
+    pub(crate) is_list: fn(&str) -> bool,
 }
 
 impl<'s> Document<'s> {

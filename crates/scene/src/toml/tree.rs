@@ -122,7 +122,7 @@ pub(super) struct Name<'s> {
 
 /// A TOML document.
 #[derive(Debug)]
-pub(in super::super) struct Document<'s> {
+pub(crate) struct Document<'s> {
     source: &'s str,
     /// Decoded strings that differ from the source.
     texts: Vec<String>,
@@ -161,7 +161,7 @@ impl<'s> Document<'s> {
     }
 
     /// The root table.
-    pub(in super::super) fn root(&self) -> Entries<'_> {
+    pub(crate) fn root(&self) -> Entries<'_> {
         Entries { document: self, table: Self::ROOT }
     }
 
@@ -367,14 +367,14 @@ fn index(index: usize) -> u32 {
 
 /// Reference to a value in a document.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Value<'d> {
+pub(crate) struct Value<'d> {
     document: &'d Document<'d>,
     node: ValueNode,
 }
 
 /// A decoded value.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) enum TomlValue<'d> {
+pub(crate) enum TomlValue<'d> {
     /// A string without quotes and escapes.
     String(&'d str),
     /// Digits with a sign, without underscores and radix prefix.
@@ -393,17 +393,17 @@ pub(in super::super) enum TomlValue<'d> {
 
 impl<'d> Value<'d> {
     /// Byte range in the source: for a table, its header or braces.
-    pub(in super::super) fn span(&self) -> Range<usize> {
+    pub(crate) fn span(&self) -> Range<usize> {
         self.node.span.range()
     }
 
     /// Its elements, if it is an array.
-    pub(in super::super) fn array(&self) -> Option<Elements<'d>> {
+    pub(crate) fn array(&self) -> Option<Elements<'d>> {
         if let TomlValue::Array(array) = self.item() { Some(array) } else { None }
     }
 
     /// Decodes the value.
-    pub(in super::super) fn item(&self) -> TomlValue<'d> {
+    pub(crate) fn item(&self) -> TomlValue<'d> {
         let (document, span) = (self.document, self.node.span);
         match self.node.kind {
             NodeKind::String(text) => TomlValue::String(document.text(span, text)),
@@ -427,55 +427,55 @@ impl<'d> Value<'d> {
 
 /// The values of an array.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Elements<'d> {
+pub(crate) struct Elements<'d> {
     document: &'d Document<'d>,
     nodes: &'d [ValueNode],
 }
 
 impl<'d> Elements<'d> {
     /// Number of entries.
-    pub(in super::super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.nodes.len()
     }
 
     /// The elements in text order.
-    pub(in super::super) fn iter(&self) -> impl Iterator<Item = Value<'d>> + use<'d> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Value<'d>> + use<'d> {
         let document = self.document;
         self.nodes.iter().map(move |node| Value { document, node: *node })
     }
 
     /// Whether the first element is a table.
-    pub(in super::super) fn is_of_tables(&self) -> bool {
+    pub(crate) fn is_of_tables(&self) -> bool {
         self.nodes.first().is_some_and(|node| matches!(node.kind, NodeKind::Table(_)))
     }
 }
 
 /// The entries of a table.
 #[derive(Clone, Copy, Debug)]
-pub(in super::super) struct Entries<'d> {
+pub(crate) struct Entries<'d> {
     document: &'d Document<'d>,
     table: TableId,
 }
 
 /// A key and its value.
 #[derive(Clone, Debug)]
-pub(in super::super) struct KeyValue<'d> {
+pub(crate) struct KeyValue<'d> {
     /// The key, decoded.
-    pub(in super::super) key: &'d str,
+    pub(crate) key: &'d str,
     /// Byte range of the key.
-    pub(in super::super) span: Range<usize>,
+    pub(crate) span: Range<usize>,
     /// Its value.
-    pub(in super::super) value: Value<'d>,
+    pub(crate) value: Value<'d>,
 }
 
 impl<'d> Entries<'d> {
     /// The entry with this key.
-    pub(in super::super) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
+    pub(crate) fn get(&self, name: &str) -> Option<KeyValue<'d>> {
         self.document.find_entry(self.table, name).map(|entry| self.entry(entry))
     }
 
     /// The entries in insertion order.
-    pub(in super::super) fn iter(&self) -> impl Iterator<Item = KeyValue<'d>> + use<'d> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = KeyValue<'d>> + use<'d> {
         let this = *self;
         let entries = &this.document.entries;
         let first = this.document.tables[this.table.0 as usize].first;
